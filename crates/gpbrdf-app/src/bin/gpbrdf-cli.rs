@@ -1,0 +1,2 @@
+//! `gpbrdf-cli`.
+fn main() {}

@@ -1,0 +1,5 @@
+//! Covariance functions and their derivatives.
+
+mod shape;
+
+pub use shape::Shape;

@@ -1,0 +1,230 @@
+//! The MERL-shaped table: 90 x 90 x 180 cells of RGB in half-difference angles.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::angles::{HalfDiff, fold_phi_d};
+use crate::brdf::{Brdf, Rgb};
+
+/// Cells along `theta_h`.
+pub const N_THETA_H: usize = 90;
+/// Cells along `theta_d`.
+pub const N_THETA_D: usize = 90;
+/// Cells along `phi_d`.
+pub const N_PHI_D: usize = 180;
+/// Cells of a table: 1,458,000.
+pub const N_CELLS: usize = N_THETA_H * N_THETA_D * N_PHI_D;
+
+/// Position of a cell: `i_phi_d + 180 (i_theta_d + 90 i_theta_h)`.
+#[must_use]
+pub const fn cell_index(i_theta_h: usize, i_theta_d: usize, i_phi_d: usize) -> usize {
+    i_phi_d + N_PHI_D * (i_theta_d + N_THETA_D * i_theta_h)
+}
+
+/// The three indices `(i_theta_h, i_theta_d, i_phi_d)` of a cell.
+#[must_use]
+pub const fn cell_indices(index: usize) -> (usize, usize, usize) {
+    (index / (N_THETA_D * N_PHI_D), index / N_PHI_D % N_THETA_D, index % N_PHI_D)
+}
+
+/// The angles of a cell's centre: `theta_h = ((i + 1/2) / 90)^2 pi/2`, `theta_d = (i + 1/2) / 90 pi/2`,
+/// `phi_d = (i + 1/2) / 180 pi`.
+#[must_use]
+pub fn cell_center(i_theta_h: usize, i_theta_d: usize, i_phi_d: usize) -> HalfDiff {
+    let u = (i_theta_h as f64 + 0.5) / N_THETA_H as f64;
+    HalfDiff {
+        theta_h: u * u * FRAC_PI_2,
+        theta_d: (i_theta_d as f64 + 0.5) / N_THETA_D as f64 * FRAC_PI_2,
+        phi_d: (i_phi_d as f64 + 0.5) / N_PHI_D as f64 * PI,
+    }
+}
+
+/// A BRDF tabulated like the MERL database (W. Matusik et al. 2003): a value in sr^-1 stands at the centre of
+/// each of 90 x 90 x 180 cells over (square-root warped `theta_h`, `theta_d`, `phi_d`).
+///
+/// A negative channel means "no data" there. 17.5 MB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BrdfTable {
+    values: Vec<[f32; 3]>,
+}
+
+/// The eight cells and weights of one trilinear lookup.
+///
+/// Computed once, it serves every table and channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Trilinear {
+    cells: [u32; 8],
+    weights: [f32; 8],
+}
+
+impl Trilinear {
+    /// The lookup at `angles`: linear in `(sqrt(theta_h / (pi/2)), theta_d, phi_d)` between cell centres,
+    /// clamped in the first two, periodic in the third.
+    #[must_use]
+    pub fn new(angles: HalfDiff) -> Self {
+        let (h0, h1, wh) = clamped((angles.theta_h.max(0.0) / FRAC_PI_2).sqrt(), N_THETA_H);
+        let (d0, d1, wd) = clamped(angles.theta_d / FRAC_PI_2, N_THETA_D);
+        let (p0, p1, wp) = periodic(fold_phi_d(angles.phi_d) / PI, N_PHI_D);
+        let mut cells = [0; 8];
+        let mut weights = [0.0; 8];
+        let mut k = 0;
+        for (h, a) in [(h0, 1.0 - wh), (h1, wh)] {
+            for (d, b) in [(d0, 1.0 - wd), (d1, wd)] {
+                for (p, c) in [(p0, 1.0 - wp), (p1, wp)] {
+                    #[expect(clippy::cast_possible_truncation, reason = "a table has 1,458,000 cells")]
+                    {
+                        cells[k] = cell_index(h, d, p) as u32;
+                        weights[k] = (a * b * c) as f32;
+                    }
+                    k += 1;
+                }
+            }
+        }
+        Self { cells, weights }
+    }
+}
+
+/// Lower node, upper node and weight of the upper one, on `n` cell centres over `[0, 1]`, clamped.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n - 1]")]
+fn clamped(t: f64, n: usize) -> (usize, usize, f64) {
+    // max before min, so that NaN becomes 0.
+    let x = (t * n as f64 - 0.5).max(0.0).min((n - 1) as f64);
+    let low = x as usize;
+    (low, (low + 1).min(n - 1), x - low as f64)
+}
+
+/// The same with the ends joined.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n)")]
+fn periodic(t: f64, n: usize) -> (usize, usize, f64) {
+    let x = (t * n as f64 - 0.5).rem_euclid(n as f64);
+    let low = (x as usize).min(n - 1);
+    (low, (low + 1) % n, x - low as f64)
+}
+
+impl BrdfTable {
+    /// A table of `values` in MERL order ([`cell_index`]); `None` unless there are [`N_CELLS`].
+    #[must_use]
+    pub fn from_values(values: Vec<[f32; 3]>) -> Option<Self> {
+        (values.len() == N_CELLS).then_some(Self { values })
+    }
+
+    /// Tabulates `f` at every cell's centre, in parallel.
+    pub fn from_fn(f: impl Fn(HalfDiff) -> Rgb + Sync) -> Self {
+        let values = (0..N_CELLS)
+            .into_par_iter()
+            .map(|index| {
+                let (h, d, p) = cell_indices(index);
+                to_f32(f(cell_center(h, d, p)))
+            })
+            .collect();
+        Self { values }
+    }
+
+    /// The values in MERL order, sr^-1.
+    #[must_use]
+    pub fn values(&self) -> &[[f32; 3]] {
+        &self.values
+    }
+
+    /// The value of one cell, sr^-1.
+    #[must_use]
+    pub fn cell(&self, i_theta_h: usize, i_theta_d: usize, i_phi_d: usize) -> [f32; 3] {
+        self.values[cell_index(i_theta_h, i_theta_d, i_phi_d)]
+    }
+
+    /// Trilinear interpolation, sr^-1. Cells without data (a negative channel) take no part, and the other
+    /// weights are scaled up in their place; zero where all eight are without data.
+    #[must_use]
+    pub fn lookup(&self, at: &Trilinear) -> [f32; 3] {
+        let mut sum = [0.0f32; 3];
+        let mut total = 0.0;
+        for (&cell, &weight) in at.cells.iter().zip(&at.weights) {
+            let value = self.values[cell as usize];
+            if value.iter().all(|&x| x >= 0.0) {
+                total += weight;
+                for c in 0..3 {
+                    sum[c] += weight * value[c];
+                }
+            }
+        }
+        if total > 0.0 { sum.map(|x| x / total) } else { [0.0; 3] }
+    }
+}
+
+impl Brdf for BrdfTable {
+    fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return [0.0; 3];
+        }
+        self.eval_half_diff(HalfDiff::from_directions(wi, wo))
+    }
+
+    fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
+        self.lookup(&Trilinear::new(angles)).map(f64::from)
+    }
+}
+
+/// Rounds to the table's precision.
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the table's precision")]
+fn to_f32(rgb: Rgb) -> [f32; 3] {
+    rgb.map(|x| x as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn indices_round_trip_and_the_valid_count_is_the_published_one() {
+        let mut valid = 0;
+        for index in 0..N_CELLS {
+            let (h, d, p) = cell_indices(index);
+            assert_eq!(cell_index(h, d, p), index);
+            valid += usize::from(cell_center(h, d, p).is_above_horizon());
+        }
+        assert_eq!(valid, 1_096_216);
+    }
+
+    #[test]
+    fn lookup_returns_cells_at_their_centres_and_linear_functions_between() {
+        let linear = |a: HalfDiff| {
+            let u = (a.theta_h / FRAC_PI_2).sqrt();
+            [1.0 + 2.0 * u, 1.0 + a.theta_d, 3.0 - u * a.theta_d]
+        };
+        let table = BrdfTable::from_fn(linear);
+        for index in (0..N_CELLS).step_by(7919) {
+            let (h, d, p) = cell_indices(index);
+            let found = table.eval_half_diff(cell_center(h, d, p));
+            for c in 0..3 {
+                assert!((found[c] - f64::from(table.cell(h, d, p)[c])).abs() < 1e-6);
+            }
+        }
+        for i in 1..500 {
+            let t = i as f64 * 0.001_9;
+            let angles = HalfDiff { theta_h: t, theta_d: 1.5 - t, phi_d: 3.3 * t };
+            let expected = linear(angles);
+            let found = table.eval_half_diff(angles);
+            for c in 0..3 {
+                assert!((found[c] - expected[c]).abs() < 2e-4, "{angles:?} {found:?} {expected:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn lookup_wraps_phi_d_skips_missing_cells_and_survives_nan() {
+        let mut table = BrdfTable::from_fn(|a| [a.phi_d.sin(), 1.0, 2.0]);
+        let near_zero = table.eval_half_diff(HalfDiff { theta_h: 0.1, theta_d: 0.1, phi_d: 1e-9 });
+        assert!((near_zero[0] - (PI / 360.0).sin()).abs() < 1e-6);
+        for value in &mut table.values[..N_CELLS / 2] {
+            *value = [-1.0; 3];
+        }
+        assert_eq!(table.eval_half_diff(HalfDiff::default()), [0.0; 3]);
+        let edge = cell_center(44, 10, 10);
+        let half = HalfDiff { theta_h: edge.theta_h * 1.01, ..edge };
+        assert!((table.eval_half_diff(half)[1] - 1.0).abs() < 1e-6);
+        let nan = HalfDiff { theta_h: f64::NAN, theta_d: f64::NAN, phi_d: f64::NAN };
+        assert!(table.eval_half_diff(nan).iter().all(|x| !x.is_infinite()));
+    }
+}
