@@ -4,7 +4,13 @@
 mod angles;
 mod brdf;
 mod error;
+mod gp;
+mod kernel;
+mod layout;
+mod simd;
+mod space;
 mod table;
+mod target;
 
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
 pub use brdf::{Brdf, Reciprocal, Rgb};
