@@ -181,7 +181,7 @@ static MATERIALS: [Material; 14] = [
     },
 ];
 
-// Rows of the parameters published with Bagher et al. (2012), red, green, blue.
+// Parameters published with Bagher et al. (2012): red, green, blue.
 
 const CHERRY_235: Sgd = Sgd {
     diffuse: [0.049_750_2, 0.021_190_2, 0.012_068_8],
@@ -286,19 +286,12 @@ mod tests {
     use super::*;
     use crate::analytic::checks::{albedo, assert_conserves_energy, assert_pinned, assert_well_behaved};
 
-    fn sgd(name: &str) -> Sgd {
-        match material(name).unwrap().brdf {
-            AnalyticBrdf::Sgd(f) => f,
-            other => panic!("{name} is {other:?}"),
-        }
-    }
-
     #[test]
     fn every_material_is_isotropic_reciprocal_finite_and_no_source_of_light() {
         for m in materials() {
             assert_well_behaved(m, m.name);
             match m.brdf {
-                // Fits to measurements: no model bounds them at grazing incidence.
+                // Fits to measurements: nothing in the model bounds them at grazing incidence.
                 AnalyticBrdf::Sgd(_) => {
                     let found = albedo(m, 0.5, 512);
                     assert!(found.iter().all(|x| *x > 0.005 && *x < 0.7), "{} {found:?}", m.name);
@@ -374,7 +367,7 @@ mod tests {
             let row = row.unwrap();
             let Some(m) = materials().iter().find(|m| m.name == &row[0]) else { continue };
             assert_eq!(row.len(), headers.len(), "{}", m.name);
-            let f = sgd(m.name);
+            let AnalyticBrdf::Sgd(f) = m.brdf else { panic!("{} is not a fit", m.name) };
             let parameters = [
                 ("rho_d", f.diffuse),
                 ("rho_s", f.specular),
