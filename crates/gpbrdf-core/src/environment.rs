@@ -89,7 +89,7 @@ impl Environment {
         Self { width, height, pixels }
     }
 
-    /// Reads a Radiance `.hdr` or an OpenEXR file (first layer with R, G and B), told apart by content.
+    /// Reads a Radiance `.hdr` or an `OpenEXR` file (first layer with R, G and B), told apart by content.
     /// Negative values become 0.
     ///
     /// # Errors

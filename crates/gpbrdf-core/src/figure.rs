@@ -214,12 +214,9 @@ fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Pi
 /// Frame, ticks and labels at 0, 30, 60 and 90 degrees of a slice at `(x, y)`.
 fn draw_axes(canvas: &mut Picture, x: usize, y: usize, size: usize, axes: &Axes, y_labels: bool) {
     let (left, top) = (x as i64, y as i64);
-    for (dx, dy, width, height) in [
-        (-1, -1, size + 2, 1),
-        (-1, size as i64, size + 2, 1),
-        (-1, 0, 1, size),
-        (size as i64, 0, 1, size),
-    ] {
+    for (dx, dy, width, height) in
+        [(-1, -1, size + 2, 1), (-1, size as i64, size + 2, 1), (-1, 0, 1, size), (size as i64, 0, 1, size)]
+    {
         canvas.fill(left + dx, top + dy, width, height, FAINT);
     }
     for degrees in [0u8, 30, 60, 90] {
@@ -319,11 +316,7 @@ fn short(value: f64) -> String {
     let decimals = (2.0 - size).clamp(0.0, 6.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within [0, 6]")]
     let text = format!("{value:.*}", decimals as usize);
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
-    }
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 fn join(title: &str, shown: &str) -> String {
@@ -367,7 +360,13 @@ mod tests {
         let options = SliceOptions { size: 128, ..SliceOptions::default() };
         let slices = slice_figure("chm_mint", Some(&truth), &prediction, None, &options).unwrap();
         let images = render_env(&[&truth, &prediction], &Environment::studio(), 64);
-        let spheres = sphere_figure("a title longer than it should be, by far, for three panels this small", Some(&images[0]), &images[1], None, None);
+        let spheres = sphere_figure(
+            "a title longer than it should be, by far, for three panels this small",
+            Some(&images[0]),
+            &images[1],
+            None,
+            None,
+        );
         for figure in [slices, spheres.unwrap()] {
             let (width, height) = (figure.width(), figure.height());
             for (i, colour) in figure.pixels().iter().enumerate() {
@@ -404,7 +403,10 @@ mod tests {
         let save = |name: &str, picture: &Picture| picture.save_png(&folder.join(name)).unwrap();
         save("slice.png", &slice_figure("glossy red", Some(&truth), &prediction, None, &options).unwrap());
         save("slice_square.png", &slice_figure("", Some(&truth), &prediction, None, &square).unwrap());
-        save("slice_sigma.png", &slice_figure("glossy red", None, &prediction, Some(&sigma), &options).unwrap());
+        save(
+            "slice_sigma.png",
+            &slice_figure("glossy red", None, &prediction, Some(&sigma), &options).unwrap(),
+        );
         save("slice_alone.png", &slice_figure("glossy red", None, &prediction, None, &options).unwrap());
         let images = render_env(&[&truth, &prediction, &sigma], &Environment::studio(), 256);
         let (a, b, c) = (&images[0], &images[1], &images[2]);

@@ -69,10 +69,8 @@ impl PixelDifference {
     /// [`Error::InvalidArgument`] when they differ in size.
     pub fn new(truth: &Image, prediction: &Image) -> Result<Self> {
         same_size(truth, prediction)?;
-        let mut values: Vec<f64> = pairs(truth, prediction)
-            .filter(|&(a, _)| a > 0.0)
-            .map(|(a, b)| (1.0 - b / a).abs())
-            .collect();
+        let mut values: Vec<f64> =
+            pairs(truth, prediction).filter(|&(a, _)| a > 0.0).map(|(a, b)| (1.0 - b / a).abs()).collect();
         if values.is_empty() {
             return Ok(Self { share_below_5_percent: 1.0, ..Self::default() });
         }
@@ -130,9 +128,8 @@ pub fn ssim(truth: &Image, prediction: &Image, exposure: f64) -> Result<f64> {
         let shown = |x: f32| clip(f64::from(x) * exposure).powf(1.0 / 2.2);
         image.pixels().iter().zip(image.mask()).map(|(p, &m)| if m { shown(p[c]) } else { 0.0 }).collect()
     };
-    let sum: f64 = (0..3)
-        .map(|c| mean_ssim(&plane(truth, c), &plane(prediction, c), truth.mask(), truth.width()))
-        .sum();
+    let sum: f64 =
+        (0..3).map(|c| mean_ssim(&plane(truth, c), &plane(prediction, c), truth.mask(), truth.width())).sum();
     Ok(sum / 3.0)
 }
 

@@ -187,7 +187,8 @@ mod tests {
 
     #[test]
     fn png_holds_the_pixels() {
-        let picture = Picture::from_fn(5, 3, |x, y| [x as u8, y as u8, 200]);
+        let picture =
+            Picture::from_fn(5, 3, |x, y| if (x + y) % 3 == 0 { [9, 90, 200] } else { [255, 1, 0] });
         let mut bytes = Vec::new();
         picture.write_png(&mut bytes).unwrap();
         let back = image::load_from_memory(&bytes).unwrap().into_rgb8();

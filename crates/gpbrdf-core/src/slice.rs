@@ -116,7 +116,8 @@ mod tests {
 
     #[test]
     fn theta_h_runs_right_and_theta_d_up() {
-        let corner = BrdfTable::from_fn(|a| if a.theta_h < 0.2 && a.theta_d > 1.4 { [1.0; 3] } else { [0.0; 3] });
+        let corner =
+            BrdfTable::from_fn(|a| if a.theta_h < 0.2 && a.theta_d > 1.4 { [1.0; 3] } else { [0.0; 3] });
         let options = SliceOptions { size: 64, ..SliceOptions::default() };
         let shown = Slice::new(&corner, &options).tone_mapped(&options);
         assert_eq!(shown.pixels()[0], [255; 3]);
