@@ -15,9 +15,13 @@ const FAINT: Rgb8 = [160, 160, 168];
 const SCALE: usize = 2;
 const LINE: usize = 8 * SCALE;
 const MARGIN: usize = 28;
+/// Between panels, without axes and with them, whose labels hang over.
 const GAP: usize = 44;
+const AXES_GAP: usize = 76;
 const SMALL_GAP: usize = 10;
 const TICK: usize = 6;
+/// How far a subscript hangs below its line.
+const SUBSCRIPT_DROP: usize = 3 * SCALE;
 /// Width of a colour bar, and its distance from the panel.
 const BAR: usize = 18;
 /// Room to the left of the first panel for the labels of the y axis.
@@ -46,8 +50,8 @@ struct Axes {
 /// there is one, sigma.
 ///
 /// The difference is [`Slice::log_difference`]; its scale is symmetric and ends at a round number at or above the
-/// 99th percentile of the absolute difference. `sigma` is shown as its mean over R, G and B, on the same kind of
-/// scale from 0.
+/// 99th percentile of the absolute difference. `sigma`, in sr^-1, is shown as its mean over R, G and B, on the
+/// same kind of scale from 0.
 ///
 /// # Errors
 /// None in practice: the slices have one size.
@@ -78,6 +82,7 @@ pub fn slice_figure(
             let limit = round_limit(&values, slice.above_horizon());
             let colours = slice.picture(|i| Colormap::Sequential.at(values[i] / limit));
             panels.push(Panel::magnitude("sigma", colours, limit));
+            note.push_str("sigma: 1/sr, mean of R, G, B");
         }
     }
     let degrees = options.phi_d.to_degrees();
@@ -168,10 +173,11 @@ impl Scale {
 /// Lays the panels out in a row, with the title above and the note below.
 fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Picture {
     let left = MARGIN + if axes.is_some() { Y_LABELS } else { 0 };
+    let gap = if axes.is_some() { AXES_GAP } else { GAP };
     let mut right = left;
     let mut places = Vec::new();
     for (i, panel) in panels.iter().enumerate() {
-        right += if i > 0 { GAP } else { 0 };
+        right += if i > 0 { gap } else { 0 };
         places.push(right);
         // A caption wider than its panel widens the panel's place.
         right += panel.picture.width().max(Picture::text_width(panel.caption, SCALE));
@@ -185,7 +191,7 @@ fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Pi
     let tallest = panels.iter().map(|panel| panel.picture.height()).max().unwrap_or(0);
     let mut bottom = top + tallest;
     if axes.is_some() {
-        bottom += TICK + 2 * SMALL_GAP + 2 * LINE;
+        bottom += TICK + 2 * SMALL_GAP + 2 * LINE + SUBSCRIPT_DROP;
     }
     let note_top = bottom + MARGIN - SMALL_GAP / 2;
     if !note.is_empty() {
@@ -224,10 +230,13 @@ fn draw_axes(canvas: &mut Picture, x: usize, y: usize, size: usize, axes: &Axes,
         let t = f64::from(degrees) / 90.0;
         let across = along(if axes.square_theta_h { t.sqrt() } else { t }, size);
         canvas.fill((x + across) as i64, (y + size) as i64, 1, TICK, FAINT);
-        // Centred on the digits: the degree sign hangs over.
-        let digits = Picture::text_width(&degrees.to_string(), SCALE);
-        let text_x = (x + across) as i64 - (digits / 2) as i64;
-        canvas.text(text_x, (y + size + TICK + SMALL_GAP) as i64, SCALE, FAINT, &label);
+        // The warp crowds the last two labels of a small slice.
+        if degrees != 60 || size - across > 3 * LINE + SMALL_GAP {
+            // Centred on the digits: the degree sign hangs over.
+            let digits = Picture::text_width(&degrees.to_string(), SCALE);
+            let text_x = (x + across) as i64 - (digits / 2) as i64;
+            canvas.text(text_x, (y + size + TICK + SMALL_GAP) as i64, SCALE, FAINT, &label);
+        }
 
         let up = y + along(1.0 - t, size);
         canvas.fill(left - TICK as i64, up as i64, TICK, 1, FAINT);

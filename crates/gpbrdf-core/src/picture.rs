@@ -72,16 +72,16 @@ impl Picture {
 
     /// Writes `text` with its upper left corner at `(x, y)`, each dot of the 8 x 8 font `scale` pixels wide.
     ///
-    /// An underscore after a Greek letter makes the next character a subscript. A character that the font lacks
+    /// An underscore after a Greek letter makes the next character a subscript, three dots lower. A character that the font lacks
     /// shows as `?`.
     pub fn text(&mut self, x: i64, y: i64, scale: usize, colour: Rgb8, text: &str) {
         for letter in letters(text, scale) {
             for (row, bits) in glyph(letter.character).into_iter().enumerate() {
                 for column in 0..8 {
                     if bits >> column & 1 == 1 {
-                        let left = x + (letter.x + column * letter.scale) as i64;
-                        let top = y + (letter.y + row * letter.scale) as i64;
-                        self.fill(left, top, letter.scale, letter.scale, colour);
+                        let left = x + (letter.x + column * scale) as i64;
+                        let top = y + (letter.y + row * scale) as i64;
+                        self.fill(left, top, scale, scale, colour);
                     }
                 }
             }
@@ -91,7 +91,7 @@ impl Picture {
     /// The width in pixels that [`Picture::text`] takes, without the empty column after the last character.
     #[must_use]
     pub fn text_width(text: &str, scale: usize) -> usize {
-        letters(text, scale).last().map_or(0, |letter| letter.x + 7 * letter.scale)
+        letters(text, scale).last().map_or(0, |letter| letter.x + 7 * scale)
     }
 
     /// Writes the picture as PNG.
@@ -144,7 +144,6 @@ struct Letter {
     character: char,
     x: usize,
     y: usize,
-    scale: usize,
 }
 
 /// Lays out a line of text.
@@ -156,11 +155,10 @@ fn letters(text: &str, scale: usize) -> Vec<Letter> {
     while let Some(character) = characters.next() {
         let subscript = if after_greek && character == '_' { characters.next() } else { None };
         if let Some(character) = subscript {
-            let small = (scale / 2).max(1);
-            letters.push(Letter { character, x, y: 9 * scale - 7 * small, scale: small });
-            x += 8 * small;
+            letters.push(Letter { character, x, y: 3 * scale });
+            x += 8 * scale;
         } else {
-            letters.push(Letter { character, x, y: 0, scale });
+            letters.push(Letter { character, x, y: 0 });
             x += 8 * scale;
         }
         after_greek = ('\u{390}'..='\u{3c9}').contains(&character);
@@ -213,7 +211,7 @@ mod tests {
             picture.text(-7, -9, 3, [9; 3], text);
         }
         assert_eq!(Picture::text_width("ab", 2), 30);
-        assert_eq!(Picture::text_width("\u{3b8}_h", 2), 16 + 7);
+        assert_eq!(Picture::text_width("\u{3b8}_h", 2), 16 + 14);
         assert_eq!(Picture::text_width("", 2), 0);
     }
 

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::angles::{HalfDiff, fold_phi_d};
+use crate::angles::HalfDiff;
 use crate::brdf::Rgb;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -23,6 +23,9 @@ pub const SPHERE_SIZE: usize = 96;
 pub const ENV_PATCHES: (usize, usize) = (48, 24);
 /// Towards the light of [`render_point`], in camera space, before normalisation.
 pub const POINT_LIGHT: [f64; 3] = [1.0, 1.0, 1.5];
+
+/// Rows and columns of the pixels shaded together.
+const TILE: usize = 8;
 
 /// A picture of the sphere in linear RGB; black outside of it. Rows from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +91,7 @@ struct Light {
 /// `L = sum_k radiance_k f(wi_k, wo) cos theta_k solid_angle_k` over [`ENV_PATCHES`].
 ///
 /// `f` is the trilinear lookup; a direction with a cosine under [`MIN_COSINE`] adds nothing. The tables share
-/// the lookups' geometry. `size` is the number of rows and of columns. Parallel over rows; the result does not
+/// the lookups' geometry. `size` is the number of rows and of columns. Parallel over tiles; the result does not
 /// depend on the number of threads. About 4 million lookups at `size` 96.
 #[must_use]
 pub fn render_env(tables: &[&BrdfTable], environment: &Environment, size: usize) -> Vec<Image> {
@@ -114,22 +117,19 @@ pub fn render_point(tables: &[&BrdfTable], size: usize) -> Vec<Image> {
 
 fn render(tables: &[&BrdfTable], lights: &[Light], size: usize) -> Vec<Image> {
     let center = |i: usize| 2.0 * (i as f64 + 0.5) / size as f64 - 1.0;
-    let rows: Vec<Vec<Vec<[f32; 3]>>> = (0..size)
+    let tiles = size.div_ceil(TILE);
+    let shaded: Vec<Vec<(usize, Vec<Rgb>)>> = (0..tiles * tiles)
         .into_par_iter()
-        .map(|row| {
-            let mut colours = vec![vec![[0.0; 3]; size]; tables.len()];
-            let mut radiance = vec![[0.0; 3]; tables.len()];
-            for column in 0..size {
-                let (x, y) = (center(column), -center(row));
-                let inside = 1.0 - x * x - y * y;
-                if inside > 0.0 {
-                    shade(tables, lights, x, y, inside.sqrt(), &mut radiance);
-                    for (picture, sum) in colours.iter_mut().zip(&radiance) {
-                        picture[column] = narrow(*sum);
-                    }
+        .map(|tile| {
+            let (left, top) = (tile % tiles * TILE, tile / tiles * TILE);
+            let mut pixels = Vec::with_capacity(TILE * TILE);
+            for row in top..(top + TILE).min(size) {
+                for column in left..(left + TILE).min(size) {
+                    let frame = Frame::new(center(column), -center(row));
+                    pixels.extend(frame.map(|frame| (row * size + column, frame)));
                 }
             }
-            colours
+            shade(tables, lights, &pixels)
         })
         .collect();
     let mask: Vec<bool> = (0..size * size)
@@ -139,41 +139,58 @@ fn render(tables: &[&BrdfTable], lights: &[Light], size: usize) -> Vec<Image> {
         })
         .collect();
     (0..tables.len())
-        .map(|t| Image {
-            width: size,
-            height: size,
-            pixels: rows.iter().flat_map(|row| row[t].iter().copied()).collect(),
-            mask: mask.clone(),
+        .map(|t| {
+            let mut pixels = vec![[0.0; 3]; size * size];
+            for (i, radiance) in shaded.iter().flatten() {
+                pixels[*i] = narrow(radiance[t]);
+            }
+            Image { width: size, height: size, pixels, mask: mask.clone() }
         })
         .collect()
 }
 
-/// Radiance towards the viewer at the normal `(x, y, z)`, for each table.
-fn shade(tables: &[&BrdfTable], lights: &[Light], x: f64, y: f64, z: f64, radiance: &mut [Rgb]) {
-    radiance.fill([0.0; 3]);
-    if z < MIN_COSINE {
-        return;
-    }
-    // Local frame: e towards the projected viewer, so that wo = (sin, 0, cos).
-    let normal = Vector3::new(x, y, z);
-    let sine = x.hypot(y);
-    let e = if sine > 0.0 { Vector3::new(-x * z / sine, -y * z / sine, sine) } else { Vector3::x() };
-    let f = normal.cross(&e);
-    let wo = Vector3::new(sine, 0.0, z);
-    for light in lights {
-        let cosine = light.direction.dot(&normal);
-        if cosine < MIN_COSINE {
-            continue;
+/// The local frame of a pixel: `e` towards the projected viewer, so that `wo = (sin, 0, cos)`.
+struct Frame {
+    e: Vector3<f64>,
+    f: Vector3<f64>,
+    normal: Vector3<f64>,
+    wo: Vector3<f64>,
+}
+
+impl Frame {
+    /// The frame at `(x, y)` of the unit disc; none where the viewer sees black.
+    fn new(x: f64, y: f64) -> Option<Self> {
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        if z < MIN_COSINE {
+            return None;
         }
-        let wi = Vector3::new(light.direction.dot(&e), light.direction.dot(&f), cosine);
-        let at = Trilinear::new(half_diff(&wi, &wo));
-        for (table, sum) in tables.iter().zip(radiance.iter_mut()) {
-            let value = table.lookup(&at);
-            for c in 0..3 {
-                sum[c] += light.irradiance[c] * cosine * f64::from(value[c]);
+        let normal = Vector3::new(x, y, z);
+        let sine = x.hypot(y);
+        let e = if sine > 0.0 { Vector3::new(-x * z / sine, -y * z / sine, sine) } else { Vector3::x() };
+        Some(Self { e, f: normal.cross(&e), normal, wo: Vector3::new(sine, 0.0, z) })
+    }
+}
+
+/// Radiance of each pixel for each table. Light by light, since neighbouring pixels read neighbouring cells.
+fn shade(tables: &[&BrdfTable], lights: &[Light], pixels: &[(usize, Frame)]) -> Vec<(usize, Vec<Rgb>)> {
+    let mut radiance: Vec<_> = pixels.iter().map(|&(i, _)| (i, vec![[0.0; 3]; tables.len()])).collect();
+    for light in lights {
+        for ((_, frame), (_, sums)) in pixels.iter().zip(&mut radiance) {
+            let cosine = light.direction.dot(&frame.normal);
+            if cosine < MIN_COSINE {
+                continue;
+            }
+            let wi = Vector3::new(light.direction.dot(&frame.e), light.direction.dot(&frame.f), cosine);
+            let at = Trilinear::new(half_diff(&wi, &frame.wo));
+            for (table, sum) in tables.iter().zip(sums) {
+                let value = table.lookup(&at);
+                for c in 0..3 {
+                    sum[c] += light.irradiance[c] * cosine * f64::from(value[c]);
+                }
             }
         }
     }
+    radiance
 }
 
 /// [`HalfDiff::from_directions`] to 5e-8 radians, for unit directions above the horizon: the sine and cosine of
@@ -191,7 +208,9 @@ fn half_diff(wi: &Vector3<f64>, wo: &Vector3<f64>) -> HalfDiff {
     let (sin_theta_h, cos_theta_h) = (horizontal / length, sum.z / length);
     let x = cos_theta_h * (cos_phi_h * wi.x + sin_phi_h * wi.y) - sin_theta_h * wi.z;
     let y = cos_phi_h * wi.y - sin_phi_h * wi.x;
-    let phi_d = if theta_d < 1e-12 { 0.0 } else { fold_phi_d(atan2(y, x)) };
+    let azimuth = atan2(y, x);
+    let folded = if azimuth < 0.0 { azimuth + PI } else { azimuth };
+    let phi_d = if theta_d < 1e-12 || folded >= PI { 0.0 } else { folded };
     HalfDiff { theta_h: theta_h.min(FRAC_PI_2), theta_d: theta_d.min(FRAC_PI_2), phi_d }
 }
 
