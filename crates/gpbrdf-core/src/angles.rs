@@ -89,6 +89,10 @@ pub fn theta_d_max(theta_h: f64, phi_d: f64) -> f64 {
 /// `phi_d` folded into `[0, pi)`; reciprocity makes `phi_d` and `phi_d + pi` the same pair of directions.
 #[must_use]
 pub fn fold_phi_d(phi_d: f64) -> f64 {
+    // The usual case first: a remainder takes longer than the rest of a lookup.
+    if (0.0..PI).contains(&phi_d) {
+        return phi_d;
+    }
     let folded = phi_d.rem_euclid(PI);
     // rem_euclid of a tiny negative number rounds up to pi itself.
     if folded >= PI { 0.0 } else { folded }

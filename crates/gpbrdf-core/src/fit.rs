@@ -240,7 +240,7 @@ fn starting_kernel(shapes: &[Shape], x: &[f64]) -> Kernel1d {
         weight: 1.0,
         shape,
         // Terms of one shape need different starts to become different.
-        length_scale: extent * 0.5f64.powi(i32::try_from(i).unwrap_or(30)),
+        length_scale: 0.25 * extent * 0.5f64.powi(i32::try_from(i).unwrap_or(30)),
     });
     Kernel1d { terms: terms.collect() }
 }

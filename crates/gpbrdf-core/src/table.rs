@@ -95,12 +95,13 @@ fn clamped(t: f64, n: usize) -> (usize, usize, f64) {
     (low, (low + 1).min(n - 1), x - low as f64)
 }
 
-/// The same with the ends joined.
+/// The same with the ends joined, for `t` in `[0, 1)`.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n)")]
 fn periodic(t: f64, n: usize) -> (usize, usize, f64) {
-    let x = (t * n as f64 - 0.5).rem_euclid(n as f64);
+    let x = t * n as f64 - 0.5;
+    let x = if x < 0.0 { x + n as f64 } else { x };
     let low = (x as usize).min(n - 1);
-    (low, (low + 1) % n, x - low as f64)
+    (low, if low + 1 == n { 0 } else { low + 1 }, x - low as f64)
 }
 
 impl BrdfTable {

@@ -100,7 +100,7 @@ impl Problem {
             for info in kernel.parameters() {
                 let (lower, upper) = match info.kind {
                     ParameterKind::LengthScale => {
-                        ((0.1 * extent / x.len() as f64).ln(), (30.0 * extent).ln())
+                        ((0.7 * extent / x.len() as f64).ln(), (20.0 * extent).ln())
                     }
                     ParameterKind::Alpha => (0.05f64.ln(), 1e3f64.ln()),
                     ParameterKind::Weight => (1e-5f64.ln(), 1e5f64.ln()),
