@@ -146,7 +146,7 @@ mod tests {
         let found = parse(SMALL.as_bytes(), Path::new("x")).unwrap();
         assert_eq!(found.samples.len(), 2);
         assert_eq!(found.description, "Grey");
-        assert!(found.samples[0].value.iter().all(|value| (value - 0.2).abs() < 2e-4));
+        assert!(found.samples[0].value.iter().all(|value| (value - 0.2).abs() < 1e-6));
         assert!((found.samples[0].wo - direction(0.25, -2.5)).norm() < 1e-15);
     }
 

@@ -249,6 +249,10 @@ impl Source<'_> {
             .read_record(&mut record)
             .map_err(|error| self.wrong("UTF-8 text in comma-separated columns", error.to_string()))?
         {
+            // A line of blanks, or a comment at the very end.
+            if record.len() == 1 && record[0].is_empty() {
+                continue;
+            }
             match &header {
                 None => {
                     let layout = self.layout(&record, line_of(&record), with_values)?;
