@@ -1,0 +1,62 @@
+//! Seeded damage to a file's bytes, for tests that no reader panics.
+#![allow(clippy::cast_possible_truncation, reason = "random bits may be cut")]
+
+/// The splitmix64 generator.
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// 32 random bits.
+    pub(crate) fn bits32(&mut self) -> u32 {
+        self.next() as u32
+    }
+
+    /// A number below `bound`, or 0 where that is 0.
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
+        (self.next() % bound.max(1) as u64) as usize
+    }
+}
+
+/// `count` damaged copies of `bytes`: changed bytes, mostly among the first `head`; words set to extremes;
+/// truncations, removed and repeated pieces.
+pub(crate) fn mutations(bytes: &[u8], head: usize, seed: u64, count: usize) -> impl Iterator<Item = Vec<u8>> {
+    let mut random = Random::new(seed);
+    (0..count).map(move |_| {
+        let mut copy = bytes.to_vec();
+        for _ in 0..=random.below(3) {
+            let reach = if random.below(4) > 0 { head.min(copy.len()) } else { copy.len() };
+            let at = random.below(reach);
+            match random.below(6) {
+                0 | 1 if !copy.is_empty() => copy[at] = random.next() as u8,
+                2 if !copy.is_empty() => copy[at] ^= 1 << random.below(8),
+                3 => {
+                    let word = [0, u64::MAX, u64::MAX >> 1, 1 << 32, 0x7FF8 << 48][random.below(5)];
+                    let width = [1, 2, 4, 8][random.below(4)].min(copy.len() - at);
+                    copy[at..at + width].copy_from_slice(&word.to_le_bytes()[..width]);
+                }
+                4 => copy.truncate(at),
+                _ => {
+                    let end = (at + random.below(16)).min(copy.len());
+                    let piece = copy[at..end].to_vec();
+                    if random.below(2) == 0 {
+                        copy.drain(at..end);
+                    } else {
+                        copy.splice(at..at, piece);
+                    }
+                }
+            }
+        }
+        copy
+    })
+}
