@@ -83,9 +83,8 @@ impl SpectrumToRgb {
         if !increasing || !first.is_finite() || !last.is_finite() || first > 780.0 || last < FIRST_NM {
             return None;
         }
-        let scale: [f64; 3] = std::array::from_fn(|k| {
-            WHITE[k] / OBSERVER_D65.iter().map(|row| row[k] * row[3]).sum::<f64>()
-        });
+        let scale: [f64; 3] =
+            std::array::from_fn(|k| WHITE[k] / OBSERVER_D65.iter().map(|row| row[k] * row[3]).sum::<f64>());
         let mut weights = vec![[0.0; 3]; wavelengths.len()];
         for (index, [x, y, z, power]) in OBSERVER_D65.into_iter().enumerate() {
             let nm = FIRST_NM + STEP_NM * index as f64;
