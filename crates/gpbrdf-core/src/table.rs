@@ -95,13 +95,12 @@ fn clamped(t: f64, n: usize) -> (usize, usize, f64) {
     (low, (low + 1).min(n - 1), x - low as f64)
 }
 
-/// The same with the ends joined, for `t` in `[0, 1)`.
+/// The same with the ends joined.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n)")]
 fn periodic(t: f64, n: usize) -> (usize, usize, f64) {
-    let x = t * n as f64 - 0.5;
-    let x = if x < 0.0 { x + n as f64 } else { x };
+    let x = (t * n as f64 - 0.5).rem_euclid(n as f64);
     let low = (x as usize).min(n - 1);
-    (low, if low + 1 == n { 0 } else { low + 1 }, x - low as f64)
+    (low, (low + 1) % n, x - low as f64)
 }
 
 impl BrdfTable {
@@ -109,6 +108,12 @@ impl BrdfTable {
     #[must_use]
     pub fn from_values(values: Vec<[f32; 3]>) -> Option<Self> {
         (values.len() == N_CELLS).then_some(Self { values })
+    }
+
+    /// A table of [`N_CELLS`] values by the caller's construction.
+    pub(crate) fn from_cells(values: Vec<[f32; 3]>) -> Self {
+        debug_assert_eq!(values.len(), N_CELLS);
+        Self { values }
     }
 
     /// Tabulates `f` at every cell's centre, in parallel.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::simd::exp_slice;
 
 /// What the Gaussian process is fitted to: a monotone function `g(f)` of a BRDF value `f` in sr^-1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +45,17 @@ impl Transform {
             Self::Identity => g.max(0.0),
             Self::Log { epsilon } => (g.exp() - epsilon).max(0.0),
             Self::CubeRoot => (g * g * g).max(0.0),
+        }
+    }
+
+    /// [`Transform::inverse`] of a whole slice; vectorised.
+    pub(crate) fn inverse_in_place(self, g: &mut [f64]) {
+        match self {
+            Self::Log { epsilon } => {
+                exp_slice(g);
+                g.iter_mut().for_each(|f| *f = (*f - epsilon).max(0.0));
+            }
+            _ => g.iter_mut().for_each(|x| *x = self.inverse(*x)),
         }
     }
 

@@ -1,0 +1,67 @@
+//! `gpbrdf-cli convert`: any source as `.binary`, `.exr` or `.csv`.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use gpbrdf_core::{
+    Content, ExrChannels, ExrPart, LatticeLayout, Layout, Sample, SampleSet, Samples, detect_symmetry, write_merl,
+    write_samples_csv, write_table_exr,
+};
+
+use super::input::open;
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Convert {
+    /// A measurement, table or model file, or the name of a built-in material.
+    input: String,
+    /// File to write: .binary (MERL table), .exr (table) or .csv (samples).
+    output: PathBuf,
+    /// Number of samples of a .csv from a source that can be asked anywhere.
+    #[arg(long, value_name = "N", default_value_t = 3072)]
+    samples: usize,
+}
+
+impl Convert {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let source = open(&self.input)?;
+        let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        match extension.as_str() {
+            "binary" | "exr" => {
+                let Some(table) = terminal.stage("tabulating", || source.table())? else {
+                    bail!("{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead", source.origin());
+                };
+                if extension == "binary" {
+                    write_merl(&self.output, &table)?;
+                } else {
+                    let part = ExrPart {
+                        name: "mean",
+                        description: &source.name,
+                        unit: "sr^-1",
+                        channels: ExrChannels::Rgb(table.values()),
+                    };
+                    write_table_exr(&self.output, &[part])?;
+                }
+            }
+            "csv" => {
+                let samples = match (&source.content, source.brdf()) {
+                    (Content::Samples(samples), _) => samples.clone(),
+                    (_, Some(brdf)) => {
+                        let layout = LatticeLayout::with_samples(self.samples, detect_symmetry(brdf))?;
+                        let set = SampleSet::measure(brdf, &Layout::Lattice(layout))?;
+                        let pairs = set.angles.iter().zip(&set.values).map(|(angles, &value)| {
+                            let (wi, wo) = angles.to_directions();
+                            Sample { wi, wo, value }
+                        });
+                        Samples { description: source.name.clone(), samples: pairs.collect() }
+                    }
+                    _ => bail!("{}: nothing to sample", source.origin()),
+                };
+                write_samples_csv(&self.output, &samples)?;
+            }
+            _ => bail!("\"{}\": expected a name that ends in .binary, .exr or .csv", self.output.display()),
+        }
+        terminal.summary(&format!("wrote {}", self.output.display()))
+    }
+}

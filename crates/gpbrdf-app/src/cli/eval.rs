@@ -1,0 +1,132 @@
+//! `gpbrdf-cli eval`: metrics of a prediction against a truth.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use gpbrdf_core::{
+    BakeSigma, BrdfTable, Content, IntervalOf, Metrics, Source, bake, interval_95,
+};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::input::{environment, open};
+use super::report::metric_lines;
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Eval {
+    /// Model, table or measurement to judge, or a built-in material.
+    prediction: String,
+    /// Truth: a table or measurement file, or a built-in material.
+    truth: String,
+    /// Environment map of the image metrics instead of the built-in one.
+    #[arg(long, value_name = "FILE")]
+    env: Option<PathBuf>,
+    /// Print JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Evaluation {
+    prediction: String,
+    truth: String,
+    metrics: Value,
+}
+
+
+
+impl Eval {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let (prediction, truth) = (open(&self.prediction)?, open(&self.truth)?);
+        let environment = environment(self.env.as_deref())?;
+        if let (Content::Model(model), Content::Samples(samples)) = (&prediction.content, &truth.content) {
+            return self.against_samples(terminal, &prediction, &truth, model, samples);
+        }
+        let table = |source: &Source| -> Result<BrdfTable> {
+            match source.table()? {
+                Some(table) => Ok(table.into_owned()),
+                None => bail!(
+                    "{}: expected a table, a model or a BRDF that can be asked anywhere, found scattered samples",
+                    source.origin()
+                ),
+            }
+        };
+        let truth_table = terminal.stage("tabulating the truth", || table(&truth))?;
+        let metrics = if let Content::Model(model) = &prediction.content {
+            let baked = terminal.stage("baking", || bake(model, BakeSigma::Latent))?;
+            let noise = model.noise_variances();
+            let interval = |cell: usize| {
+                let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
+                    let sigma = baked.sigma.as_ref().map_or(0.0, |s| f64::from(s.value(cell, c)));
+                    let mean = f64::from(baked.mean.values()[cell][c]);
+                    interval_95(model.transform, mean, (sigma * sigma + noise[c]).sqrt())
+                });
+                (ends.map(|e| e.0), ends.map(|e| e.1))
+            };
+            terminal.stage("comparing", || Metrics::new(&truth_table, &baked.mean, &environment, Some(&interval)))?
+        } else {
+            let predicted = table(&prediction)?;
+            terminal.stage("comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
+        };
+        if self.json {
+            let metrics = serde_json::to_value(&metrics)?;
+            return self.print(terminal, &prediction, &truth, metrics);
+        }
+        terminal.summary(&format!("{} against {}", prediction.origin(), truth.origin()))?;
+        terminal.summary(&metric_lines(&metrics).join("\n"))
+    }
+
+    /// A model against scattered measurements: errors and coverage at their directions.
+    fn against_samples(
+        &self,
+        terminal: &Terminal,
+        prediction: &Source,
+        truth: &Source,
+        model: &gpbrdf_core::Model,
+        samples: &gpbrdf_core::Samples,
+    ) -> Result<()> {
+        let angles: Vec<_> = samples.samples.iter().map(gpbrdf_core::Sample::half_diff).collect();
+        let predicted = terminal.stage("predicting", || model.predict(&angles, IntervalOf::Observation));
+        let (mut absolute, mut square, mut covered) = (0.0, 0.0, 0usize);
+        let mut logs = Vec::with_capacity(3 * samples.samples.len());
+        for (sample, p) in samples.samples.iter().zip(&predicted) {
+            for c in 0..3 {
+                let (f, g) = (sample.value[c], p.mean[c]);
+                absolute += (f - g).abs();
+                square += (f - g).powi(2);
+                covered += usize::from(p.lower[c] <= f && f <= p.upper[c]);
+                logs.push(((g + 1e-3).ln() - (f + 1e-3).ln()).abs());
+            }
+        }
+        logs.sort_unstable_by(f64::total_cmp);
+        let n = logs.len() as f64;
+        let rmse = (logs.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
+        let metrics = serde_json::json!({
+            "samples": samples.samples.len(),
+            "mae": absolute / n,
+            "mse": square / n,
+            "log_rmse": rmse,
+            "median_abs_log": logs[logs.len() / 2],
+            "coverage_95": covered as f64 / n,
+        });
+        if self.json {
+            return self.print(terminal, prediction, truth, metrics);
+        }
+        terminal.summary(&format!("{} against {} samples of {}", prediction.origin(), angles.len(), truth.origin()))?;
+        terminal.summary(&format!(
+            "  median |ln error| {:.4}, rms ln error {rmse:.4}, MAE {:.4g} /sr, MSE {:.4g} /sr^2\n  95 % interval covers {:.1} % of the samples",
+            logs[logs.len() / 2],
+            absolute / n,
+            square / n,
+            100.0 * covered as f64 / n
+        ))
+    }
+
+    fn print(&self, terminal: &Terminal, prediction: &Source, truth: &Source, metrics: Value) -> Result<()> {
+        let evaluation = Evaluation { prediction: prediction.origin(), truth: truth.origin(), metrics };
+        terminal.print(&format!("{}\n", serde_json::to_string_pretty(&evaluation)?))
+    }
+}

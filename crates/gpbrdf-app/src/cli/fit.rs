@@ -1,0 +1,62 @@
+//! `gpbrdf-cli fit`: the model only.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use clap::Args;
+use gpbrdf_core::{AtomicFile, Provenance, fit};
+
+use super::input::open;
+use super::model_args::ModelArgs;
+use super::report::{Report, Seconds};
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Fit {
+    /// A measurement or table file, or the name of a built-in material.
+    input: String,
+    /// Model file to write.
+    #[arg(short, long, value_name = "FILE", default_value = "model.safetensors")]
+    output: PathBuf,
+    #[command(flatten)]
+    model: ModelArgs,
+    /// Print the report as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Fit {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let start = Instant::now();
+        let mut seconds = Seconds::default();
+        let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
+        let samples = seconds.measure("sample", || self.model.sample(&source, terminal))?;
+        let options = self.model.fit_options()?;
+        let provenance = Provenance {
+            material: source.name.clone(),
+            source: source.origin(),
+            sha256: source.sha256.clone(),
+            ..Provenance::default()
+        };
+        let (model, fits) =
+            seconds.measure("fit", || terminal.stage("fitting", || fit(&samples, &options, provenance)))?;
+        let mut report = Report::new(&model, &fits, seconds);
+        report.outputs.push(self.output.display().to_string());
+        let begin = Instant::now();
+        let mut file = AtomicFile::create(&self.output)?;
+        file.write_all(&model.to_bytes()?)?;
+        file.commit()?;
+        report.seconds.add("write", begin);
+        report.seconds.add("total", start);
+        if !report.converged {
+            terminal.warn("the search for hyper-parameters did not converge");
+        }
+        if self.json {
+            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
+        } else {
+            terminal.summary(&report.summary())
+        }
+    }
+}

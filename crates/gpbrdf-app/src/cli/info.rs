@@ -1,0 +1,66 @@
+//! `gpbrdf-cli info`: what a file is.
+
+use anyhow::Result;
+use clap::Args;
+use gpbrdf_core::{Content, merl_material_name};
+use serde_json::json;
+
+use super::input::open;
+use super::report::describe;
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Info {
+    /// A file, or the name of a built-in material.
+    input: String,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let source = open(&self.input)?;
+        let details = match &source.content {
+            Content::Table(table) => {
+                let data = |v: &&[f32; 3]| v.iter().all(|&x| x >= 0.0);
+                let filled = table.values().iter().filter(data);
+                let largest = filled.clone().flatten().fold(0.0f32, |a, &b| a.max(b));
+                json!({ "cells": table.values().len(), "cells_with_data": filled.count(), "largest_value": largest,
+                    "merl_material": merl_material_name(&source.sha256) })
+            }
+            Content::Samples(samples) => {
+                let largest = samples.samples.iter().flat_map(|s| s.value).fold(0.0, f64::max);
+                json!({ "samples": samples.samples.len(), "largest_value": largest })
+            }
+            Content::Function(brdf) => {
+                let symmetry = gpbrdf_core::detect_symmetry(brdf.as_ref());
+                json!({ "symmetry": symmetry })
+            }
+            Content::Model(model) => {
+                let (solver, kernel, hyperparameters) = describe(model);
+                json!({ "samples": model.samples(), "solver": solver, "kernel": kernel, "transform": model.transform,
+                    "provenance": model.provenance, "hyperparameters": hyperparameters })
+            }
+        };
+        if self.json {
+            let all = json!({ "name": source.name, "kind": source.kind, "description": source.description,
+                "sha256": source.sha256, "details": details });
+            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
+        }
+        let mut text = format!("{}: {}\n", source.name, source.kind);
+        if !source.description.is_empty() {
+            text.push_str(&format!("  {}\n", source.description));
+        }
+        if let Some(details) = details.as_object() {
+            for (name, value) in details.iter().filter(|(_, value)| !value.is_null()) {
+                let shown = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                text.push_str(&format!("  {}: {shown}\n", name.replace('_', " ")));
+            }
+        }
+        if !source.sha256.is_empty() {
+            text.push_str(&format!("  sha256: {}\n", source.sha256));
+        }
+        terminal.print(&text)
+    }
+}

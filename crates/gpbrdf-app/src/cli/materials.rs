@@ -1,0 +1,30 @@
+//! `gpbrdf-cli materials`: the built-in ones.
+
+use anyhow::Result;
+use clap::Args;
+use gpbrdf_core::materials;
+use serde_json::json;
+
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Materials {
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Materials {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        if self.json {
+            let all: Vec<_> = materials()
+                .iter()
+                .map(|m| json!({ "name": m.name, "title": m.title, "description": m.description, "source": m.source }))
+                .collect();
+            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
+        }
+        let width = materials().iter().map(|m| m.name.len()).max().unwrap_or(0);
+        let lines = materials().iter().map(|m| format!("{:width$}  {}\n", m.name, m.description));
+        terminal.print(&lines.collect::<String>())
+    }
+}

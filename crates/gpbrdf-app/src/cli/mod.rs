@@ -1,0 +1,105 @@
+//! Parse, run, print the chain of errors, and choose the exit code.
+
+mod bake;
+mod convert;
+mod eval;
+mod fit;
+mod info;
+mod input;
+mod materials;
+mod model_args;
+mod predict;
+mod report;
+mod slice;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use terminal::Terminal;
+
+/// Complete, render-ready BRDFs out of few measurements, with an error bar.
+#[derive(Debug, Parser)]
+#[command(name = "gpbrdf-cli", version, about, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Print nothing but errors and what was asked for.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Print more; twice for even more.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    verbose: u8,
+    /// Worker threads; all processors by default. Results do not depend on it.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Sample, fit, bake and compare: the main job.
+    Bake(bake::Bake),
+    /// Sample and fit; write the model only.
+    Fit(fit::Fit),
+    /// Values with 95 % intervals at the directions of a CSV file.
+    Predict(predict::Predict),
+    /// Compare a prediction with a truth.
+    Eval(eval::Eval),
+    /// A picture of a BRDF at one phi_d.
+    Slice(slice::SliceCommand),
+    /// Write any source as .binary, .exr or .csv.
+    Convert(convert::Convert),
+    /// What a file or a built-in material is.
+    Info(info::Info),
+    /// The built-in materials.
+    Materials(materials::Materials),
+}
+
+/// Runs the command line of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    // Ctrl-C: no partial file stays behind.
+    let handler = ctrlc::set_handler(|| {
+        let _held = gpbrdf_core::remove_pending();
+        std::process::exit(130);
+    });
+    if let Err(error) = handler {
+        eprintln!("warning: Ctrl-C may leave temporary files behind: {error}");
+    }
+    if let Some(threads) = arguments.threads {
+        // Fails only where a pool exists already, and none does yet.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+    }
+    let terminal = Terminal::new(arguments.quiet, arguments.verbose);
+    let result = match arguments.command {
+        Command::Bake(command) => command.run(&terminal),
+        Command::Fit(command) => command.run(&terminal),
+        Command::Predict(command) => command.run(&terminal),
+        Command::Eval(command) => command.run(&terminal),
+        Command::Slice(command) => command.run(&terminal),
+        Command::Convert(command) => command.run(&terminal),
+        Command::Info(command) => command.run(&terminal),
+        Command::Materials(command) => command.run(&terminal),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One line: the chain from the outside in.
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_argument_definitions_are_consistent() {
+        super::Arguments::command().debug_assert();
+    }
+}

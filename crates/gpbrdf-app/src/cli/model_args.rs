@@ -1,0 +1,212 @@
+//! How to sample and fit, as options of `bake` and `fit`.
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use gpbrdf_core::{
+    FitOptions, InputSpace, LatticeLayout, Layout, MeanFunction, Noise, OptimizeOptions, SampleSet, Shape,
+    Solver, Source, Symmetry, Transform, detect_symmetry,
+};
+
+use super::terminal::Terminal;
+
+/// Number of values that the paper takes, 2.58 % of a table.
+const PAPER_SAMPLES: usize = 37_616;
+
+/// Samples off a lattice are solved densely: a number that takes seconds.
+const DENSE_SAMPLES: usize = 2_000;
+
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ModelArgs {
+    /// Nodes of the lattice along theta_h, theta_d and phi_d, for example 48x32x24.
+    #[arg(long, value_name = "HxDxP", value_parser = parse_lattice, conflicts_with = "samples")]
+    lattice: Option<[usize; 3]>,
+    /// Number of samples; the lattice is chosen near it. [default: 37616 on a lattice, 2000 off it]
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Where to sample a source that can be asked anywhere.
+    #[arg(long, value_enum, default_value = "lattice")]
+    layout: LayoutName,
+    /// Symmetry in phi_d that samples and model rely on; auto measures it.
+    #[arg(long, value_enum, default_value = "auto")]
+    symmetry: SymmetryName,
+    /// Exponent that crowds the lattice's nodes at the specular peak; 1 is even in sqrt(theta_h).
+    #[arg(long, value_name = "EXPONENT")]
+    node_density: Option<f64>,
+    /// Exact solver.
+    #[arg(long, value_enum, default_value = "auto")]
+    solver: SolverName,
+    /// Kernel shapes, summed: se, rq, matern12, matern32, matern52, matern (with --nu).
+    #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value = "matern52")]
+    kernel: String,
+    /// Smoothness of `--kernel matern`.
+    #[arg(long, value_name = "NU", default_value_t = 1.5)]
+    nu: f64,
+    /// What is fitted: ln(f + epsilon), f itself or its cube root.
+    #[arg(long, value_enum, default_value = "log")]
+    transform: TransformName,
+    /// Epsilon of `--transform log`, sr^-1.
+    #[arg(long, value_name = "VALUE", default_value_t = 1e-3)]
+    epsilon: f64,
+    /// Prior mean.
+    #[arg(long, value_enum, default_value = "constant")]
+    mean: MeanName,
+    /// Noise variance in squared target units, or auto to find it.
+    #[arg(long, value_name = "VARIANCE|auto", default_value = "auto", value_parser = parse_noise)]
+    noise: NoiseArg,
+    /// Seed of random layouts and restarts.
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    seed: u64,
+    /// Further starts of the search for hyper-parameters.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    restarts: usize,
+    /// Hyper-parameters for each channel instead of shared ones.
+    #[arg(long)]
+    per_channel: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct NoiseArg(Noise);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LayoutName {
+    Lattice,
+    Random,
+    Cells,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SymmetryName {
+    Auto,
+    Bilateral,
+    Reciprocal,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SolverName {
+    Auto,
+    Lattice,
+    Dense,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TransformName {
+    Log,
+    Identity,
+    CubeRoot,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MeanName {
+    Constant,
+    Zero,
+}
+
+fn parse_lattice(text: &str) -> Result<[usize; 3], String> {
+    let sides: Vec<usize> = text.split(['x', 'X']).map_while(|side| side.parse().ok()).collect();
+    match <[usize; 3]>::try_from(sides) {
+        Ok(sides) if text.split(['x', 'X']).count() == 3 => Ok(sides),
+        _ => Err("expected three numbers like 48x32x24".into()),
+    }
+}
+
+fn parse_noise(text: &str) -> Result<NoiseArg, String> {
+    if text == "auto" {
+        return Ok(NoiseArg(Noise::Optimized));
+    }
+    match text.parse::<f64>() {
+        Ok(variance) if variance > 0.0 && variance.is_finite() => Ok(NoiseArg(Noise::Fixed(variance))),
+        _ => Err("expected auto or a positive number".into()),
+    }
+}
+
+impl ModelArgs {
+    /// Measures a source as asked for.
+    pub(crate) fn sample(&self, source: &Source, terminal: &Terminal) -> Result<SampleSet> {
+        if let gpbrdf_core::Content::Samples(samples) = &source.content {
+            if self.lattice.is_some() || self.samples.is_some() {
+                bail!(
+                    "{}: expected no --lattice and no --samples for scattered measurements, found one: all {} are used",
+                    source.origin(),
+                    samples.samples.len()
+                );
+            }
+            return Ok(SampleSet::from(samples));
+        }
+        let Some(brdf) = source.brdf() else { bail!("{}: nothing to sample", source.origin()) };
+        let layout = match self.layout {
+            LayoutName::Lattice => {
+                let symmetry = match self.symmetry {
+                    SymmetryName::Auto => detect_symmetry(brdf),
+                    SymmetryName::Bilateral => Symmetry::Bilateral,
+                    SymmetryName::Reciprocal => Symmetry::Reciprocal,
+                };
+                terminal.detail(&format!("symmetry: {symmetry:?}"));
+                let mut lattice = match self.lattice {
+                    Some(shape) => LatticeLayout { shape, symmetry, ..LatticeLayout::default() },
+                    None => LatticeLayout::with_samples(self.samples.unwrap_or(PAPER_SAMPLES), symmetry)?,
+                };
+                if let Some(density) = self.node_density {
+                    lattice.node_density = density;
+                }
+                Layout::Lattice(lattice)
+            }
+            name => {
+                if self.lattice.is_some() {
+                    bail!("--lattice: expected --layout lattice, found another layout");
+                }
+                let count = self.samples.unwrap_or(DENSE_SAMPLES);
+                if name == LayoutName::Random {
+                    Layout::Random { count, seed: self.seed }
+                } else {
+                    Layout::Cells { count, seed: self.seed }
+                }
+            }
+        };
+        Ok(SampleSet::measure(brdf, &layout)?)
+    }
+
+    /// The options of the fit.
+    pub(crate) fn fit_options(&self) -> Result<FitOptions> {
+        let kernel = self.kernel.split('+').map(|name| self.shape(name.trim())).collect::<Result<Vec<_>>>()?;
+        let symmetry = match self.symmetry {
+            SymmetryName::Reciprocal => Symmetry::Reciprocal,
+            SymmetryName::Auto | SymmetryName::Bilateral => Symmetry::Bilateral,
+        };
+        let density = self.node_density.unwrap_or(LatticeLayout::default().node_density);
+        Ok(FitOptions {
+            solver: match self.solver {
+                SolverName::Auto => Solver::Auto,
+                SolverName::Lattice => Solver::Lattice,
+                SolverName::Dense => Solver::Dense,
+            },
+            kernel,
+            transform: match self.transform {
+                TransformName::Log => Transform::Log { epsilon: self.epsilon },
+                TransformName::Identity => Transform::Identity,
+                TransformName::CubeRoot => Transform::CubeRoot,
+            },
+            mean: match self.mean {
+                MeanName::Constant => MeanFunction::Constant,
+                MeanName::Zero => MeanFunction::Zero,
+            },
+            noise: self.noise.0,
+            per_channel: self.per_channel,
+            space: InputSpace::WarpedBox { density, symmetry },
+            optimize: OptimizeOptions { restarts: self.restarts, seed: self.seed, ..OptimizeOptions::default() },
+        })
+    }
+
+    fn shape(&self, name: &str) -> Result<Shape> {
+        Ok(match name {
+            "se" => Shape::SquaredExponential,
+            "rq" => Shape::RationalQuadratic { alpha: 1.0 },
+            "matern12" => Shape::Matern12,
+            "matern32" => Shape::Matern32,
+            "matern52" => Shape::Matern52,
+            "matern" => Shape::Matern { nu: self.nu },
+            other => bail!(
+                "--kernel: expected shapes out of se, rq, matern12, matern32, matern52, matern joined by +, found \"{other}\""
+            ),
+        })
+    }
+}

@@ -1,0 +1,57 @@
+//! `gpbrdf-cli predict`: values with intervals at given directions.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use gpbrdf_core::{AtomicFile, IntervalOf, Model, read_directions_csv};
+
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Predict {
+    /// Model file.
+    model: PathBuf,
+    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the header says
+    /// otherwise.
+    directions: PathBuf,
+    /// CSV file to write instead of standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Intervals of the noise-free value instead of a new measurement's.
+    #[arg(long)]
+    latent: bool,
+}
+
+impl Predict {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let model = Model::load(&self.model)?;
+        let directions = read_directions_csv(&self.directions)?;
+        let of = if self.latent { IntervalOf::Latent } else { IntervalOf::Observation };
+        let predictions = terminal.stage("predicting", || model.predict(&directions.angles, of));
+        let mut text = directions.columns.join(",");
+        for part in ["", "_lower", "_upper"] {
+            for channel in ["r", "g", "b"] {
+                text.push_str(&format!(",{channel}{part}"));
+            }
+        }
+        text.push('\n');
+        for (row, p) in directions.rows.iter().zip(&predictions) {
+            text.push_str(&row.join(","));
+            for value in p.mean.iter().chain(&p.lower).chain(&p.upper) {
+                text.push_str(&format!(",{value:e}"));
+            }
+            text.push('\n');
+        }
+        match &self.output {
+            None => terminal.print(&text),
+            Some(path) => {
+                let mut file = AtomicFile::create(path)?;
+                file.write_all(text.as_bytes()).with_context(|| format!("cannot write \"{}\"", path.display()))?;
+                file.commit()?;
+                terminal.summary(&format!("wrote {} predictions to {}", predictions.len(), path.display()))
+            }
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! What a run has to say, for machines and for people.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use gpbrdf_core::{FitReport, LatticeLayout, Metrics, Model, Process};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// `report.json`.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Report {
+    pub(crate) material: String,
+    pub(crate) source: String,
+    pub(crate) layout: String,
+    pub(crate) lattice: Option<LatticeLayout>,
+    pub(crate) samples: usize,
+    pub(crate) solver: &'static str,
+    pub(crate) kernel: String,
+    pub(crate) transform: Value,
+    pub(crate) hyperparameters: Value,
+    pub(crate) log_marginal_likelihood: f64,
+    pub(crate) evaluations: usize,
+    pub(crate) converged: bool,
+    pub(crate) at_bound: Vec<String>,
+    pub(crate) seconds: Seconds,
+    pub(crate) backend: &'static str,
+    pub(crate) metrics: Option<Metrics>,
+    pub(crate) outputs: Vec<String>,
+}
+
+/// Wall-clock seconds of each stage; absent stages did not run.
+#[derive(Clone, Debug, Default, Serialize)]
+#[serde(transparent)]
+pub(crate) struct Seconds(BTreeMap<&'static str, f64>);
+
+impl Seconds {
+    /// Adds the time that `work` takes to `stage`.
+    pub(crate) fn measure<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.add(stage, start);
+        result
+    }
+
+    pub(crate) fn add(&mut self, stage: &'static str, start: Instant) {
+        *self.0.entry(stage).or_default() += start.elapsed().as_secs_f64();
+    }
+
+    pub(crate) fn get(&self, stage: &str) -> f64 {
+        self.0.get(stage).copied().unwrap_or(0.0)
+    }
+}
+
+impl Report {
+    pub(crate) fn new(model: &Model, fits: &[FitReport], seconds: Seconds) -> Self {
+        let provenance = &model.provenance;
+        let (solver, kernel, hyper) = describe(model);
+        Self {
+            material: provenance.material.clone(),
+            source: provenance.source.clone(),
+            layout: provenance.layout.clone(),
+            lattice: provenance.lattice.clone(),
+            samples: model.samples(),
+            solver,
+            kernel,
+            transform: serde_json::to_value(model.transform).unwrap_or_default(),
+            hyperparameters: hyper,
+            log_marginal_likelihood: fits.iter().map(|f| f.log_marginal_likelihood).sum(),
+            evaluations: fits.iter().map(|f| f.evaluations).sum(),
+            converged: fits.iter().all(|f| f.converged),
+            at_bound: fits.iter().flat_map(|f| f.at_bound.iter().cloned()).collect(),
+            seconds,
+            backend: "cpu",
+            metrics: None,
+            outputs: Vec::new(),
+        }
+    }
+
+    /// A few lines for people.
+    pub(crate) fn summary(&self) -> String {
+        let mut lines = vec![format!("{} from {}", self.material, self.source)];
+        let grid = self.lattice.as_ref().map_or_else(String::new, |l| {
+            let [a, b, c] = l.shape;
+            format!(" ({a}x{b}x{c})")
+        });
+        lines.push(format!(
+            "  {} samples, {}{grid}, {} solver, kernel {}",
+            self.samples, self.layout, self.solver, self.kernel
+        ));
+        lines.push(format!(
+            "  log marginal likelihood {:.1} after {} evaluations{}",
+            self.log_marginal_likelihood,
+            self.evaluations,
+            if self.converged { "" } else { ", NOT converged" }
+        ));
+        if !self.at_bound.is_empty() {
+            lines.push(format!("  at a bound of its range: {}", self.at_bound.join(", ")));
+        }
+        if let Some(m) = &self.metrics {
+            lines.extend(metric_lines(m));
+        }
+        let stages = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "write", "total"];
+        let shown = stages.iter().filter(|s| self.seconds.0.contains_key(**s));
+        let times: Vec<String> = shown.map(|s| format!("{s} {:.0} ms", 1e3 * self.seconds.get(s))).collect();
+        lines.push(format!("  {}", times.join(", ")));
+        for output in &self.outputs {
+            lines.push(format!("  wrote {output}"));
+        }
+        lines.join("\n")
+    }
+}
+
+/// The metrics that people look at first.
+pub(crate) fn metric_lines(m: &Metrics) -> Vec<String> {
+    let (cells, images) = (&m.cells, &m.images);
+    let mut lines = vec![
+        format!(
+            "  sphere: PSNR {:.1} dB under the environment, {:.1} dB under a point light, SSIM {:.4}",
+            images.psnr_env, images.psnr_point, images.ssim_env
+        ),
+        format!(
+            "  cells: median |ln error| {:.4}, rms ln error {:.4}, MAE {:.4g} /sr, MSE {:.4g} /sr^2",
+            cells.median_abs_log, cells.log_rmse, cells.mae, cells.mse
+        ),
+    ];
+    if let Some(coverage) = cells.coverage_95 {
+        lines.push(format!("  95 % interval covers {:.1} % of the cells", 100.0 * coverage));
+    }
+    lines
+}
+
+/// Solver, kernel and hyper-parameters of a model.
+pub(crate) fn describe(model: &Model) -> (&'static str, String, Value) {
+    let (solver, mut all) = match &model.process {
+        Process::Lattice(groups) => {
+            let each = groups.iter().map(|gp| {
+                let hyper = gp.hyper();
+                let names = |k: &gpbrdf_core::Kernel1d| {
+                    k.terms.iter().map(|t| t.shape.name()).collect::<Vec<_>>().join(" + ")
+                };
+                let single = hyper.kernels.iter().all(|k| k.terms.len() == 1);
+                let lengths: Vec<Value> = hyper
+                    .kernels
+                    .iter()
+                    .map(|k| match k.terms.as_slice() {
+                        [term] if single => json!(term.length_scale),
+                        terms => terms.iter().map(|t| t.length_scale).collect(),
+                    })
+                    .collect();
+                let value = json!({
+                    "length_scale": lengths,
+                    "signal_variance": hyper.signal_variance,
+                    "noise_variance": hyper.noise_variance,
+                    "axes": hyper.kernels,
+                });
+                (format!("product of {} along u, v, phi", names(&hyper.kernels[0])), value)
+            });
+            ("lattice", each.collect::<Vec<_>>())
+        }
+        Process::Dense(groups) => {
+            let each = groups.iter().map(|gp| {
+                let value = json!({
+                    "length_scale": gp.kernel().length_scales(),
+                    "signal_variance": gp.kernel().variance(),
+                    "noise_variance": gp.noise_variance(),
+                    "jitter": gp.jitter(),
+                    "terms": gp.kernel(),
+                });
+                (gp.kernel().name(), value)
+            });
+            ("dense", each.collect())
+        }
+        _ => ("unknown", vec![(String::new(), Value::Null)]),
+    };
+    let kernel = all.first().map_or_else(String::new, |(name, _)| name.clone());
+    let hyper = if all.len() == 1 {
+        all.swap_remove(0).1
+    } else {
+        json!({ "channels": all.into_iter().map(|(_, value)| value).collect::<Vec<_>>() })
+    };
+    (solver, kernel, hyper)
+}

@@ -1,0 +1,3 @@
+//! The command line of gpbrdf as a library: the binary only calls [`cli::main`].
+
+pub mod cli;
