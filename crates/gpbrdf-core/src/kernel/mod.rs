@@ -1,5 +1,6 @@
 //! Covariance functions and their derivatives.
 
+mod bessel;
 mod shape;
 
 pub use shape::Shape;
