@@ -5,6 +5,7 @@ mod angles;
 mod brdf;
 mod error;
 mod kernel;
+mod simd;
 mod table;
 
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
