@@ -61,35 +61,64 @@ pub(crate) fn exp_slice(x: &mut [f64]) {
 /// Lanes of a reduction: eight sums run side by side, in an order that does not depend on the processor.
 const LANES: usize = 8;
 
-/// `sum_i a_i b_i`; slices of one length. To be called within [`vectorized`].
-#[inline(always)]
+/// `sum_i a_i b_i`; slices of one length.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (a_chunks, a_rest) = a.as_chunks::<LANES>();
     let (b_chunks, b_rest) = b.as_chunks::<LANES>();
-    for (a, b) in a_chunks.iter().zip(b_chunks) {
-        for l in 0..LANES {
-            lanes[l] += a[l] * b[l];
+    vectorized(|| {
+        for (a, b) in a_chunks.iter().zip(b_chunks) {
+            for l in 0..LANES {
+                lanes[l] += a[l] * b[l];
+            }
         }
-    }
+    });
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     lanes.iter().sum::<f64>() + rest
 }
 
-/// `sum_i a_i b_i c_i`; slices of one length. To be called within [`vectorized`].
-#[inline(always)]
+/// `sum_i a_i b_i c_i`; slices of one length.
 pub(crate) fn dot3(a: &[f64], b: &[f64], c: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (a_chunks, a_rest) = a.as_chunks::<LANES>();
     let (b_chunks, b_rest) = b.as_chunks::<LANES>();
     let (c_chunks, c_rest) = c.as_chunks::<LANES>();
-    for ((a, b), c) in a_chunks.iter().zip(b_chunks).zip(c_chunks) {
-        for l in 0..LANES {
-            lanes[l] += a[l] * b[l] * c[l];
+    vectorized(|| {
+        for ((a, b), c) in a_chunks.iter().zip(b_chunks).zip(c_chunks) {
+            for l in 0..LANES {
+                lanes[l] += a[l] * b[l] * c[l];
+            }
         }
-    }
+    });
     let rest: f64 = a_rest.iter().zip(b_rest).zip(c_rest).map(|((a, b), c)| a * b * c).sum();
     lanes.iter().sum::<f64>() + rest
+}
+
+/// `out_i += a x_i`.
+pub(crate) fn add_scaled(a: f64, x: &[f64], out: &mut [f64]) {
+    vectorized(|| {
+        for (o, x) in out.iter_mut().zip(x) {
+            *o += a * x;
+        }
+    });
+}
+
+/// `out_i = a x_i`.
+pub(crate) fn scale_into(a: f64, x: &[f64], out: &mut [f64]) {
+    vectorized(|| {
+        for (o, x) in out.iter_mut().zip(x) {
+            *o = a * x;
+        }
+    });
+}
+
+/// `out_i *= x_i`.
+pub(crate) fn multiply(x: &[f64], out: &mut [f64]) {
+    vectorized(|| {
+        for (o, x) in out.iter_mut().zip(x) {
+            *o *= x;
+        }
+    });
 }
 
 #[cfg(test)]

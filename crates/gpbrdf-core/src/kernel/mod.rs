@@ -1,6 +1,16 @@
 //! Covariance functions and their derivatives.
 
+mod axis;
 mod bessel;
+mod composite;
+mod rows;
 mod shape;
+mod slices;
 
+pub use axis::{Kernel1d, Term1d};
+pub use composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
+pub(crate) use rows::{Points, RowScratch};
 pub use shape::Shape;
+
+#[cfg(test)]
+pub(crate) use composite::tests::kernels as test_kernels;

@@ -1,0 +1,222 @@
+//! Covariance functions of one coordinate.
+
+use serde::{Deserialize, Serialize};
+
+use super::shape::Shape;
+use crate::error::{Error, Result};
+
+/// One summand of a [`Kernel1d`]: `weight shape(d / length_scale)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Term1d {
+    /// Share of the variance, positive.
+    pub weight: f64,
+    /// The radial shape.
+    pub shape: Shape,
+    /// Length scale, positive, in the coordinate's unit.
+    pub length_scale: f64,
+}
+
+/// A covariance function of the distance along one axis, `k(d) = sum_m weight_m shape_m(d / l_m)`.
+///
+/// Its log-parameters are, for each term, `ln weight` (not for the first term, whose weight stays fixed, usually
+/// at 1, since the variance of the whole kernel scales all of them), `ln length_scale` and `ln alpha` where the
+/// shape has one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kernel1d {
+    /// The summands; at least one.
+    pub terms: Vec<Term1d>,
+}
+
+impl Kernel1d {
+    /// One shape of weight 1.
+    #[must_use]
+    pub fn new(shape: Shape, length_scale: f64) -> Self {
+        Self { terms: vec![Term1d { weight: 1.0, shape, length_scale }] }
+    }
+
+    /// `k(d)` at the distance `d`.
+    #[must_use]
+    pub fn value(&self, d: f64) -> f64 {
+        self.terms.iter().map(|t| t.weight * t.shape.value((d / t.length_scale).powi(2))).sum()
+    }
+
+    /// `k(d)`, adding `factor dk/dp` to `out` for every log-parameter `p`.
+    ///
+    /// `out` has [`Kernel1d::n_parameters`] elements; elements missing at its end are left out.
+    pub fn add_gradient(&self, d: f64, factor: f64, out: &mut [f64]) -> f64 {
+        let mut out = out.iter_mut();
+        let mut add = |amount: f64| {
+            if let Some(o) = out.next() {
+                *o += factor * amount;
+            }
+        };
+        let mut total = 0.0;
+        for (m, term) in self.terms.iter().enumerate() {
+            let r2 = (d / term.length_scale).powi(2);
+            let (k, slope) = term.shape.value_and_slope(r2);
+            if m > 0 {
+                add(term.weight * k);
+            }
+            add(if r2 > 0.0 { term.weight * slope * r2 } else { 0.0 });
+            if term.shape.has_alpha() {
+                add(term.weight * term.shape.d_log_alpha(r2));
+            }
+            total += term.weight * k;
+        }
+        total
+    }
+
+    /// Whether there is a term and every parameter is in its domain.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for the first that is not.
+    pub fn validate(&self) -> Result<()> {
+        if self.terms.is_empty() {
+            return Err(Error::argument("kernel of one axis", "at least one term", "none"));
+        }
+        for term in &self.terms {
+            positive("weight of a kernel term", term.weight)?;
+            positive("length scale", term.length_scale)?;
+            term.shape.validate()?;
+        }
+        Ok(())
+    }
+
+    /// The number of log-parameters.
+    #[must_use]
+    pub fn n_parameters(&self) -> usize {
+        self.terms
+            .iter()
+            .enumerate()
+            .map(|(m, t)| usize::from(m > 0) + 1 + usize::from(t.shape.has_alpha()))
+            .sum()
+    }
+
+    /// The log-parameters, in the order of the type's description.
+    #[must_use]
+    pub fn log_parameters(&self) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.n_parameters());
+        for (m, term) in self.terms.iter().enumerate() {
+            if m > 0 {
+                out.push(term.weight.ln());
+            }
+            out.push(term.length_scale.ln());
+            out.extend(term.shape.alpha().map(f64::ln));
+        }
+        out
+    }
+
+    /// Their names, for example `terms[1].log_weight`.
+    #[must_use]
+    pub fn parameter_names(&self) -> Vec<String> {
+        let mut out = Vec::with_capacity(self.n_parameters());
+        for (m, term) in self.terms.iter().enumerate() {
+            if m > 0 {
+                out.push(format!("terms[{m}].log_weight"));
+            }
+            out.push(format!("terms[{m}].log_length_scale"));
+            if term.shape.has_alpha() {
+                out.push(format!("terms[{m}].log_alpha"));
+            }
+        }
+        out
+    }
+
+    /// Sets the parameters from their logarithms.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for a wrong number of values, or one whose exponential is zero or not finite;
+    /// the kernel is then unchanged.
+    pub fn set_log_parameters(&mut self, log_parameters: &[f64]) -> Result<()> {
+        check_log_parameters(log_parameters, self.n_parameters())?;
+        let mut values = log_parameters.iter().map(|p| p.exp());
+        for (m, term) in self.terms.iter_mut().enumerate() {
+            if m > 0 {
+                term.weight = values.next().unwrap_or(term.weight);
+            }
+            term.length_scale = values.next().unwrap_or(term.length_scale);
+            if term.shape.has_alpha() {
+                term.shape = values.next().map_or(term.shape, |alpha| term.shape.with_alpha(alpha));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Refuses what is not positive and finite.
+pub(super) fn positive(what: &'static str, value: f64) -> Result<()> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(Error::argument(what, "a positive number", value))
+    }
+}
+
+/// Refuses a wrong count and logarithms of what is not a positive finite number.
+pub(super) fn check_log_parameters(log_parameters: &[f64], expected: usize) -> Result<()> {
+    if log_parameters.len() != expected {
+        let expected = format!("{expected} values");
+        return Err(Error::argument("log-parameters of a kernel", expected, log_parameters.len()));
+    }
+    log_parameters.iter().try_for_each(|p| positive("exponential of a log-parameter", p.exp()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum_of_three() -> Kernel1d {
+        let term = |weight, shape, length_scale| Term1d { weight, shape, length_scale };
+        Kernel1d {
+            terms: vec![
+                term(1.0, Shape::Matern52, 0.7),
+                term(0.4, Shape::RationalQuadratic { alpha: 1.4 }, 0.2),
+                term(2.5, Shape::SquaredExponential, 3.0),
+            ],
+        }
+    }
+
+    #[test]
+    fn a_sum_is_the_sum_of_its_terms() {
+        let kernel = sum_of_three();
+        let expected = Shape::Matern52.value(0.25 / 0.49)
+            + 0.4 * (1.0 + 0.25 / 0.04 / 2.8f64).powf(-1.4)
+            + 2.5 * (-0.125f64 / 9.0).exp();
+        assert!((kernel.value(0.5) - expected).abs() < 1e-14);
+        assert!((kernel.value(0.0) - 3.9).abs() < 1e-15);
+    }
+
+    #[test]
+    fn log_parameters_round_trip_and_drive_the_gradient() {
+        let kernel = sum_of_three();
+        let p = kernel.log_parameters();
+        assert_eq!(p.len(), kernel.n_parameters());
+        assert_eq!(kernel.parameter_names().len(), p.len());
+        assert_eq!(kernel.parameter_names()[1], "terms[1].log_weight");
+        let mut gradient = vec![0.0; p.len()];
+        let value = kernel.add_gradient(0.6, 2.0, &mut gradient);
+        assert!((value - kernel.value(0.6)).abs() < 1e-14);
+        for i in 0..p.len() {
+            let at = |step: f64| {
+                let (mut k, mut p) = (kernel.clone(), p.clone());
+                p[i] += step;
+                k.set_log_parameters(&p).unwrap();
+                k.value(0.6)
+            };
+            let difference = 2.0 * (at(1e-5) - at(-1e-5)) / 2e-5;
+            assert!((difference - gradient[i]).abs() < 1e-9, "{i}: {difference} {}", gradient[i]);
+        }
+    }
+
+    #[test]
+    fn wrong_parameters_are_refused() {
+        let mut kernel = sum_of_three();
+        assert!(kernel.set_log_parameters(&[0.0; 3]).is_err());
+        assert!(kernel.set_log_parameters(&[0.0, 0.0, 0.0, f64::NAN, 0.0, 0.0]).is_err());
+        assert!(kernel.set_log_parameters(&[0.0, 0.0, 0.0, 800.0, 0.0, 0.0]).is_err());
+        assert_eq!(kernel, sum_of_three());
+        assert!(Kernel1d { terms: vec![] }.validate().is_err());
+        assert!(Kernel1d::new(Shape::Matern12, -1.0).validate().is_err());
+        assert!(sum_of_three().validate().is_ok());
+    }
+}
