@@ -63,15 +63,16 @@ const LANES: usize = 8;
 
 /// `sum_i a_i b_i`; slices of one length.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; LANES];
     let (a_chunks, a_rest) = a.as_chunks::<LANES>();
     let (b_chunks, b_rest) = b.as_chunks::<LANES>();
-    vectorized(|| {
+    let lanes = vectorized(|| {
+        let mut lanes = [0.0; LANES];
         for (a, b) in a_chunks.iter().zip(b_chunks) {
             for l in 0..LANES {
                 lanes[l] += a[l] * b[l];
             }
         }
+        lanes
     });
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     lanes.iter().sum::<f64>() + rest
@@ -79,16 +80,17 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// `sum_i a_i b_i c_i`; slices of one length.
 pub(crate) fn dot3(a: &[f64], b: &[f64], c: &[f64]) -> f64 {
-    let mut lanes = [0.0; LANES];
     let (a_chunks, a_rest) = a.as_chunks::<LANES>();
     let (b_chunks, b_rest) = b.as_chunks::<LANES>();
     let (c_chunks, c_rest) = c.as_chunks::<LANES>();
-    vectorized(|| {
+    let lanes = vectorized(|| {
+        let mut lanes = [0.0; LANES];
         for ((a, b), c) in a_chunks.iter().zip(b_chunks).zip(c_chunks) {
             for l in 0..LANES {
                 lanes[l] += a[l] * b[l] * c[l];
             }
         }
+        lanes
     });
     let rest: f64 = a_rest.iter().zip(b_rest).zip(c_rest).map(|((a, b), c)| a * b * c).sum();
     lanes.iter().sum::<f64>() + rest

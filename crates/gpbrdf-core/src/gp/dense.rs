@@ -52,6 +52,20 @@ impl DenseEvaluator {
         Ok(Self { x: x.to_vec(), dimension, y, matrix: vec![0.0; n * n], second: Vec::new() })
     }
 
+    /// The lower triangle of `K + noise_variance I`, column-major, `n x n`; what stands above the diagonal means
+    /// nothing.
+    ///
+    /// Cost: `n^2 / 2` kernel evaluations, in parallel.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for an invalid kernel or noise.
+    pub fn covariance(&mut self, kernel: &Kernel, noise_variance: f64) -> Result<&[f64]> {
+        check_kernel(kernel, self.dimension, noise_variance)?;
+        let points = Points::new(&self.x, &kernel.metric);
+        factor::assemble(kernel, &points, noise_variance, &mut self.matrix);
+        Ok(&self.matrix)
+    }
+
     /// The log marginal likelihood at the kernel's hyper-parameters, without gradient.
     ///
     /// Cost: `n^3 / 6` multiply-adds.

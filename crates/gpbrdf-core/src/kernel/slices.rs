@@ -1,7 +1,7 @@
 //! Shapes over whole slices, in vector instructions where the form is closed.
 
 use super::shape::Shape;
-use crate::simd::{exp, vectorized};
+use crate::simd::{exp, exp_slice, vectorized};
 
 /// Above this `exp(-s)` is zero; bounding the factor of it by this keeps infinity times zero out.
 const LARGEST: f64 = 800.0;
@@ -44,7 +44,13 @@ impl Shape {
                 let s = bounded_sqrt(5.0 * r2);
                 (1.0 + s + s * s * (1.0 / 3.0)) * exp(-s)
             }),
-            Self::RationalQuadratic { .. } | Self::Matern { .. } => {
+            Self::RationalQuadratic { alpha } => {
+                for v in r2.iter_mut() {
+                    *v = -alpha * (*v / (2.0 * alpha)).ln_1p();
+                }
+                exp_slice(r2);
+            }
+            Self::Matern { .. } => {
                 for v in r2 {
                     *v = self.value(*v);
                 }
@@ -74,7 +80,14 @@ impl Shape {
                 let e = exp(-s);
                 ((1.0 + s + s * s * (1.0 / 3.0)) * e, 5.0 / 3.0 * (1.0 + s) * e)
             }),
-            Self::RationalQuadratic { .. } | Self::Matern { .. } => {
+            Self::RationalQuadratic { alpha } => {
+                value.copy_from_slice(r2);
+                self.fill(value);
+                for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
+                    *slope = *value / (1.0 + r2 / (2.0 * alpha));
+                }
+            }
+            Self::Matern { .. } => {
                 for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
                     (*value, *slope) = self.value_and_slope(*r2);
                 }
