@@ -26,9 +26,9 @@ pub struct DenseLikelihood {
     pub jitter: f64,
 }
 
-/// Samples with the working matrices of the likelihood, for many evaluations at changing hyper-parameters.
+/// Samples with the working matrix of the likelihood, for many evaluations at changing hyper-parameters.
 ///
-/// Memory: `8 n^2` bytes, `16 n^2` from the first gradient on.
+/// Memory: `8 n^2` bytes, and `1024 n` a thread for a gradient.
 #[derive(Debug)]
 pub struct DenseEvaluator {
     x: Vec<f64>,
@@ -36,7 +36,6 @@ pub struct DenseEvaluator {
     /// Column-major, one column a channel.
     y: Vec<f64>,
     matrix: Vec<f64>,
-    second: Vec<f64>,
 }
 
 impl DenseEvaluator {
@@ -44,12 +43,12 @@ impl DenseEvaluator {
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for sizes that do not agree, no samples, or values that are not finite;
-    /// [`Error::TooLarge`] where the two matrices of a gradient do not fit in memory.
+    /// [`Error::TooLarge`] where the matrix does not fit in memory.
     pub fn new(x: &[f64], dimension: usize, y: &[f64], channels: usize) -> Result<Self> {
         let y = check_samples(x, dimension, y, channels)?;
         let n = y.len() / channels;
         dense_cost(n, channels, 1).check()?;
-        Ok(Self { x: x.to_vec(), dimension, y, matrix: vec![0.0; n * n], second: Vec::new() })
+        Ok(Self { x: x.to_vec(), dimension, y, matrix: vec![0.0; n * n] })
     }
 
     /// The lower triangle of `K + noise_variance I`, column-major, `n x n`; what stands above the diagonal means
@@ -80,7 +79,7 @@ impl DenseEvaluator {
     /// The log marginal likelihood and its gradient,
     /// `1/2 sum_c tr((alpha_c alpha_c^T - K^-1) dK/dp)` with `alpha_c = K^-1 y_c`.
     ///
-    /// The derivatives of the matrix are formed a strip at a time and never kept. Cost: `n^3 / 2` multiply-adds.
+    /// Neither the inverse nor the derivatives of the matrix are ever kept whole. Cost: `n^3 / 2` multiply-adds.
     ///
     /// # Errors
     /// As [`DenseEvaluator::evaluate`].
@@ -92,25 +91,20 @@ impl DenseEvaluator {
         let Factorized { mut likelihood, points, alpha } = self.factorized(kernel, noise_variance)?;
         let n = points.len();
         let channels = self.y.len() / n;
-        if self.second.is_empty() {
-            self.second = vec![0.0; n * n];
-        }
-        factor::invert_factor(&self.matrix, n, &mut self.second);
-        factor::inverse_from_inverse_factor(&self.second, n, &mut self.matrix);
-
         // Column by column of the lower triangle; each pair off the diagonal stands for two, so the factor 1/2
         // applies to the diagonal only. The partial sums are added up in the order of the columns.
         let n_parameters = kernel.n_parameters();
-        let partial: Vec<Vec<f64>> = self
-            .matrix
-            .par_chunks_mut(n * factor::COLUMNS)
-            .enumerate()
+        let (factor, dimension) = (&self.matrix, self.dimension);
+        let partial: Vec<Vec<f64>> = factor::inverse_blocks(n)
             .map_init(
-                || RowScratch::new(kernel.dimension()),
-                |scratch, (block, columns)| {
+                || (RowScratch::new(dimension), vec![0.0; n * factor::INVERSE_COLUMNS]),
+                |(scratch, block), (first, width)| {
+                    let rows = n - first;
+                    let block = &mut block[..rows * width];
+                    factor::inverse_columns(factor, n, first, width, block);
                     let mut sums = vec![0.0; n_parameters + 1];
-                    for (column, j) in columns.chunks_mut(n).zip(block * factor::COLUMNS..) {
-                        let weights = &mut column[j..];
+                    for (column, j) in block.chunks_mut(rows).zip(first..) {
+                        let weights = &mut column[j - first..];
                         weights.iter_mut().for_each(|w| *w *= -(channels as f64));
                         for alpha in alpha.chunks(n) {
                             add_scaled(alpha[j], &alpha[j..], weights);
@@ -305,22 +299,22 @@ impl DenseGp {
     /// Every sample predicted from all others, without refitting.
     ///
     /// `sigma_i^2 = 1 / [K^-1]_ii`, `mu_i = y_i - alpha_i sigma_i^2`. Source: C. E. Rasmussen and C. K. I. Williams,
-    /// "Gaussian Processes for Machine Learning" (2006), eqs. 5.10 to 5.12. Cost: `n^3 / 6` multiply-adds and
-    /// another `8 n^2` bytes for the time of the call.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`] where the second matrix does not fit in memory.
-    pub fn leave_one_out(&self) -> Result<LeaveOneOut> {
+    /// "Gaussian Processes for Machine Learning" (2006), eqs. 5.10 to 5.12. Cost: `n^3 / 6` multiply-adds.
+    #[must_use]
+    pub fn leave_one_out(&self) -> LeaveOneOut {
         let n = self.points.len();
-        dense_cost(n, self.channels, 0).check()?;
-        let mut inverse_factor = vec![0.0; n * n];
-        factor::invert_factor(&self.factor, n, &mut inverse_factor);
         // [K^-1]_ii is the squared norm of column i of L^-1.
-        let variances: Vec<f64> = inverse_factor
-            .par_chunks(n)
-            .enumerate()
-            .map(|(i, column)| dot(&column[i..], &column[i..]).recip())
+        let variances: Vec<Vec<f64>> = factor::inverse_blocks(n)
+            .map_init(
+                || vec![0.0; n * factor::INVERSE_COLUMNS],
+                |block, (first, width)| {
+                    let block = &mut block[..(n - first) * width];
+                    factor::inverse_factor_columns(&self.factor, n, first, width, block);
+                    block.chunks(n - first).map(|column| dot(column, column).recip()).collect()
+                },
+            )
             .collect();
+        let variances = variances.concat();
         let mut residuals = vec![0.0; n * self.channels];
         let mut log_predictive_density = 0.0;
         for (c, alpha) in self.alpha.chunks(n).enumerate() {
@@ -330,7 +324,7 @@ impl DenseGp {
                 log_predictive_density -= 0.5 * ((TAU * variance).ln() + residual * residual / variance);
             }
         }
-        Ok(LeaveOneOut { residuals, variances, log_predictive_density })
+        LeaveOneOut { residuals, variances, log_predictive_density }
     }
 }
 
