@@ -218,7 +218,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions, provenance: Provenance) ->
             space.validate()?;
             let points: Vec<[f64; 3]> = samples.angles.iter().map(|&a| space.coordinates(a)).collect();
             let fitted = groups.into_iter().map(|targets| {
-                fit_dense(points.as_flattened(), &targets, space.metrics(), &options.kernel, options.noise, &options.optimize)
+                fit_dense(points.as_flattened(), &targets, &space.metrics(), &options.kernel, options.noise, &options.optimize)
             });
             let (gps, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
             (space, Process::Dense(gps), reports)

@@ -39,7 +39,7 @@ pub use analytic::{
 };
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
-pub use bake::{BakeSigma, Baked, SigmaTable, bake};
+pub use bake::{SigmaTable, bake_mean, bake_sigma};
 pub use brdf::{Brdf, Reciprocal, Rgb};
 pub use colormap::Colormap;
 pub use environment::{EnvDirection, Environment};
@@ -47,6 +47,7 @@ pub use error::{Error, Result};
 pub use figure::{slice_figure, sphere_figure};
 pub use fit::{FitOptions, Layout, SampleSet, Solver, detect_symmetry, fit};
 pub use formats::cornell::read_cornell;
+pub use formats::image_exr::write_image_exr;
 pub use formats::merl::{MERL_BYTES, read_merl, write_merl, write_merl_to};
 pub use formats::merl_sha256::merl_material_name;
 pub use formats::rgl::{RglBrdf, read_rgl};
@@ -56,11 +57,13 @@ pub use formats::samples_csv::{
 pub use formats::table_exr::{ExrChannels, ExrPart, read_table_exr, write_table_exr, write_table_exr_to};
 pub use formats::{FileKind, recognise, sha256_file, sha256_hex};
 pub use gp::{
-    DenseGp, FitReport, LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood, Noise, OptimizeOptions,
-    Optimum, Parameter, fit_dense, fit_lattice, maximize,
+    DenseCost, DenseEvaluator, DenseGp, DenseLikelihood, FitReport, LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood, LeaveOneOut, Noise, OptimizeOptions,
+    Optimum, Parameter, dense_cost, fit_dense, fit_lattice, maximize,
 };
 pub use image_metrics::{ImageMetrics, PixelDifference, exposure_of, psnr, ssim};
-pub use kernel::{AxisMetric, Kernel1d, ParameterInfo, ParameterKind, Shape, Term1d};
+pub use kernel::{
+    AxisMetric, Kernel, Kernel1d, KernelBody, KernelTerm, ParameterKind, Shape, Term1d,
+};
 pub use layout::{LatticeLayout, Symmetry, random_cells, random_directions};
 pub use materials::{Material, material, materials};
 pub use metrics::{CellMetrics, Interval, Metrics};

@@ -79,7 +79,8 @@ pub enum IntervalOf {
 }
 
 impl Model {
-    /// The predictive mean of the target at each pair of directions, prior mean included.
+    /// The predictive mean of the target at each pair of directions, prior mean included. Angles that are not finite
+    /// give NaN.
     #[must_use]
     pub fn predict_target(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
         let points: Vec<[f64; 3]> = angles.iter().map(|&a| self.space.coordinates(a)).collect();
@@ -96,7 +97,10 @@ impl Model {
                 groups.iter().for_each(|gp| add(&gp.predict_mean(&points), gp.data().channels));
             }
             Process::Dense(groups) => {
-                groups.iter().for_each(|gp| add(&gp.predict_mean(points.as_flattened()), gp.channels()));
+                for gp in groups {
+                    let means = gp.predict_mean(points.as_flattened());
+                    add(&means.unwrap_or_else(|_| vec![f64::NAN; points.len() * gp.channels()]), gp.channels());
+                }
             }
         }
         out
@@ -132,6 +136,7 @@ impl Model {
             Process::Dense(groups) => {
                 for gp in groups {
                     let variances = gp.predict_variance_latent(points.as_flattened());
+                    let variances = variances.unwrap_or_else(|_| vec![f64::NAN; points.len()]);
                     set(&variances, gp.noise_variance(), gp.channels());
                 }
             }
@@ -168,12 +173,28 @@ impl Model {
         out
     }
 
+    /// The first channel of each process of the model.
+    pub(crate) fn first_channels(&self) -> Vec<usize> {
+        let channels: Vec<usize> = match &self.process {
+            Process::Lattice(groups) => groups.iter().map(|g| g.data().channels).collect(),
+            Process::Dense(groups) => groups.iter().map(DenseGp::channels).collect(),
+        };
+        let mut first = 0;
+        channels
+            .into_iter()
+            .map(|count| {
+                first += count;
+                first - count
+            })
+            .collect()
+    }
+
     /// Number of measured directions.
     #[must_use]
     pub fn samples(&self) -> usize {
         match &self.process {
             Process::Lattice(groups) => groups.first().map_or(0, |g| g.data().len()),
-            Process::Dense(groups) => groups.first().map_or(0, DenseGp::len),
+            Process::Dense(groups) => groups.first().map_or(0, DenseGp::n_samples),
         }
     }
 }

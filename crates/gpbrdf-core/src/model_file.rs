@@ -45,7 +45,7 @@ enum ProcessHeader {
 struct DenseHeader {
     kernel: Kernel,
     noise_variance: f64,
-    jitter: f64,
+    channels: usize,
 }
 
 impl Model {
@@ -74,15 +74,12 @@ impl Model {
             Process::Dense(groups) => {
                 let mut headers = Vec::with_capacity(groups.len());
                 for (g, gp) in groups.iter().enumerate() {
-                    let (n, channels) = (gp.len(), gp.channels());
+                    let (n, channels) = (gp.n_samples(), gp.channels());
                     insert(format!("{g}.x"), vec![n, 3], gp.inputs());
-                    insert(format!("{g}.targets"), vec![n, channels], gp.targets());
-                    insert(format!("{g}.weights"), vec![n, channels], gp.weights());
-                    headers.push(DenseHeader {
-                        kernel: gp.kernel().clone(),
-                        noise_variance: gp.noise_variance(),
-                        jitter: gp.jitter(),
-                    });
+                    insert(format!("{g}.targets"), vec![n, channels], &gp.targets());
+                    insert(format!("{g}.weights"), vec![n, channels], &gp.weights());
+                    let (kernel, noise_variance) = (gp.kernel().clone(), gp.noise_variance());
+                    headers.push(DenseHeader { kernel, noise_variance, channels });
                 }
                 ProcessHeader::Dense(headers)
             }
@@ -176,16 +173,14 @@ impl Model {
             }
             ProcessHeader::Dense(headers) => {
                 let groups = headers.into_iter().enumerate().map(|(g, dense)| {
-                    DenseGp::from_weights(
-                        read(format!("{g}.x"))?,
-                        3,
-                        read(format!("{g}.targets"))?,
-                        read(format!("{g}.weights"))?,
-                        dense.kernel,
-                        dense.noise_variance,
-                        dense.jitter,
-                    )
-                    .map_err(damaged)
+                    let (x, targets) = (read(format!("{g}.x"))?, read(format!("{g}.targets"))?);
+                    let weights = read(format!("{g}.weights"))?;
+                    let DenseHeader { kernel, noise_variance, channels } = dense;
+                    if kernel.dimension() != 3 {
+                        return Err(wrong("a kernel of 3 coordinates", kernel.dimension().to_string()));
+                    }
+                    DenseGp::from_weights(&x, &targets, &weights, channels, kernel, noise_variance)
+                        .map_err(damaged)
                 });
                 Process::Dense(groups.collect::<Result<_>>()?)
             }

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
+use crate::bake::bake_mean;
 use crate::brdf::{Brdf, Reciprocal};
 use crate::error::Result;
 use crate::formats::cornell::read_cornell;
@@ -128,18 +129,14 @@ impl Source {
     }
 
     /// The source as a table, baked or tabulated where it is none; `None` for scattered samples.
-    ///
-    /// # Errors
-    /// A model that cannot be baked.
-    pub fn table(&self) -> Result<Option<Cow<'_, BrdfTable>>> {
-        Ok(match &self.content {
+    #[must_use]
+    pub fn table(&self) -> Option<Cow<'_, BrdfTable>> {
+        match &self.content {
             Content::Table(table) => Some(Cow::Borrowed(table)),
             Content::Function(brdf) => Some(Cow::Owned(BrdfTable::from_fn(|a| brdf.eval_half_diff(a)))),
-            Content::Model(model) => {
-                Some(Cow::Owned(crate::bake::bake(model, crate::bake::BakeSigma::Skip)?.mean))
-            }
+            Content::Model(model) => Some(Cow::Owned(bake_mean(model))),
             Content::Samples(_) => None,
-        })
+        }
     }
 
     /// The file's path or `built-in NAME`, for reports.
@@ -158,7 +155,7 @@ mod tests {
     #[test]
     fn built_in_materials_are_filled_up_to_the_horizon() {
         let source = Source::built_in("cherry-235").unwrap();
-        let table = source.table().unwrap().unwrap();
+        let table = source.table().unwrap();
         assert!(table.values().iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
         let angles = HalfDiff { theta_h: 0.3, theta_d: 0.4, phi_d: 1.0 };
         assert!(source.brdf().unwrap().eval_half_diff(angles)[0] > 0.0);
@@ -172,7 +169,7 @@ mod tests {
         assert_eq!((rgl.name.as_str(), rgl.kind.as_str()), ("paper_blue_rgb", "RGL measurement"));
         assert!(rgl.description.contains("Blue A4 paper") && rgl.sha256.len() == 64);
         let cornell = Source::open(&dir.join("cornell/cayman.brdf")).unwrap();
-        assert!(cornell.brdf().is_none() && cornell.table().unwrap().is_none());
+        assert!(cornell.brdf().is_none() && cornell.table().is_none());
         assert!(Source::open(&dir.join("rgl/absent.bsdf")).is_err());
     }
 }

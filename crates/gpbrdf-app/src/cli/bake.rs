@@ -6,9 +6,9 @@ use std::time::Instant;
 use anyhow::Result;
 use clap::Args;
 use gpbrdf_core::{
-    AtomicFile, BakeSigma, Baked, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS,
-    Picture, Provenance, SliceOptions, Source, bake, fit, interval_95, render_env, slice_figure, sphere_figure,
-    write_merl_to, write_table_exr_to,
+    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, Provenance,
+    SigmaTable, SliceOptions, Source, bake_mean, bake_sigma, fit, interval_95, render_env, slice_figure,
+    sphere_figure, write_merl_to, write_table_exr_to,
 };
 
 use super::input::{OutputFolder, environment, open};
@@ -46,6 +46,12 @@ pub(crate) struct Bake {
     json: bool,
 }
 
+/// Tables of a model.
+struct Baked {
+    mean: BrdfTable,
+    sigma: Option<SigmaTable>,
+}
+
 impl Bake {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let start = Instant::now();
@@ -64,10 +70,13 @@ impl Bake {
         let (model, fits) =
             seconds.measure("fit", || terminal.stage("fitting", || fit(&samples, &options, provenance)))?;
         drop(samples);
-        let baked = self.bake(&model, &mut seconds, terminal)?;
+        let mean = seconds.measure("bake_mean", || terminal.stage("baking the mean", || bake_mean(&model)));
+        let sigma = (!self.no_sigma)
+            .then(|| seconds.measure("bake_sigma", || terminal.stage("baking sigma", || bake_sigma(&model))));
+        let baked = Baked { mean, sigma };
         let compare = !(self.no_metrics && self.no_images);
         let truth = if compare {
-            seconds.measure("metrics", || terminal.stage("tabulating the truth", || source.table()))?
+            seconds.measure("metrics", || terminal.stage("tabulating the truth", || source.table()))
         } else {
             None
         };
@@ -89,18 +98,6 @@ impl Bake {
         } else {
             terminal.summary(&report.summary())
         }
-    }
-
-    /// Bakes the mean, then sigma; `bake_sigma` is the time that sigma adds.
-    fn bake(&self, model: &Model, seconds: &mut Seconds, terminal: &Terminal) -> Result<Baked> {
-        let mut baked = seconds
-            .measure("bake_mean", || terminal.stage("baking the mean", || bake(model, BakeSigma::Skip)))?;
-        if !self.no_sigma {
-            baked.sigma = seconds.measure("bake_sigma", || {
-                terminal.stage("baking sigma", || gpbrdf_core::bake_sigma(model).map(Some))
-            })?;
-        }
-        Ok(baked)
     }
 
     /// Writes all outputs or none.

@@ -29,7 +29,7 @@ impl Convert {
         let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         match extension.as_str() {
             "binary" | "exr" => {
-                let Some(table) = terminal.stage("tabulating", || source.table())? else {
+                let Some(table) = terminal.stage("tabulating", || source.table()) else {
                     bail!("{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead", source.origin());
                 };
                 if extension == "binary" {

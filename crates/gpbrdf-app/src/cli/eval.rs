@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use gpbrdf_core::{
-    BakeSigma, BrdfTable, Content, IntervalOf, Metrics, Source, bake, interval_95,
+    BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma, interval_95,
 };
 use serde::Serialize;
 use serde_json::Value;
@@ -46,7 +46,7 @@ impl Eval {
             return self.against_samples(terminal, &prediction, &truth, model, samples);
         }
         let table = |source: &Source| -> Result<BrdfTable> {
-            match source.table()? {
+            match source.table() {
                 Some(table) => Ok(table.into_owned()),
                 None => bail!(
                     "{}: expected a table, a model or a BRDF that can be asked anywhere, found scattered samples",
@@ -56,17 +56,17 @@ impl Eval {
         };
         let truth_table = terminal.stage("tabulating the truth", || table(&truth))?;
         let metrics = if let Content::Model(model) = &prediction.content {
-            let baked = terminal.stage("baking", || bake(model, BakeSigma::Latent))?;
+            let (mean, sigma) = terminal.stage("baking", || (bake_mean(model), bake_sigma(model)));
             let noise = model.noise_variances();
             let interval = |cell: usize| {
                 let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-                    let sigma = baked.sigma.as_ref().map_or(0.0, |s| f64::from(s.value(cell, c)));
-                    let mean = f64::from(baked.mean.values()[cell][c]);
-                    interval_95(model.transform, mean, (sigma * sigma + noise[c]).sqrt())
+                    let latent = f64::from(sigma.value(cell, c));
+                    let mean = f64::from(mean.values()[cell][c]);
+                    interval_95(model.transform, mean, (latent * latent + noise[c]).sqrt())
                 });
                 (ends.map(|e| e.0), ends.map(|e| e.1))
             };
-            terminal.stage("comparing", || Metrics::new(&truth_table, &baked.mean, &environment, Some(&interval)))?
+            terminal.stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
         } else {
             let predicted = table(&prediction)?;
             terminal.stage("comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?

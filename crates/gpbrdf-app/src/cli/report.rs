@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use gpbrdf_core::{FitReport, LatticeLayout, Metrics, Model, Process};
+use gpbrdf_core::{FitReport, KernelBody, LatticeLayout, Metrics, Model, Process};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -160,9 +160,14 @@ pub(crate) fn describe(model: &Model) -> (&'static str, String, Value) {
         }
         Process::Dense(groups) => {
             let each = groups.iter().map(|gp| {
+                let lengths = gp.kernel().terms.iter().map(|term| match &term.body {
+                    KernelBody::Ard { length_scale, .. } => json!(length_scale),
+                    KernelBody::Product(axes) => json!(axes),
+                });
+                let mut lengths: Vec<Value> = lengths.collect();
                 let value = json!({
-                    "length_scale": gp.kernel().length_scales(),
-                    "signal_variance": gp.kernel().variance(),
+                    "length_scale": if lengths.len() == 1 { lengths.remove(0) } else { Value::Array(lengths) },
+                    "signal_variance": gp.kernel().prior_variance(),
                     "noise_variance": gp.noise_variance(),
                     "jitter": gp.jitter(),
                     "terms": gp.kernel(),

@@ -69,7 +69,7 @@ impl SliceCommand {
 }
 
 fn table(source: &Source) -> Result<BrdfTable> {
-    match source.table()? {
+    match source.table() {
         Some(table) => Ok(table.into_owned()),
         None => bail!("{}: expected a BRDF that can be asked anywhere, found scattered samples; fit them first", source.origin()),
     }

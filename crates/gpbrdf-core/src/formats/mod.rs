@@ -1,6 +1,7 @@
 //! File formats, and which of them a file is.
 
 pub(crate) mod cornell;
+pub(crate) mod image_exr;
 pub(crate) mod merl;
 pub(crate) mod merl_sha256;
 #[cfg(test)]

@@ -139,15 +139,16 @@ impl LatticeData {
     fn gram(&self, k: usize, kernel: &Kernel1d, derivatives: bool) -> (Mat<f64>, Vec<Mat<f64>>) {
         let (x, metric) = (&self.coordinates[k], self.metrics[k]);
         let n = x.len();
-        let count = if derivatives { kernel.parameter_count() } else { 0 };
+        let count = if derivatives { kernel.n_parameters() } else { 0 };
         let mut gram = Mat::zeros(n, n);
         let mut slopes = vec![Mat::zeros(n, n); count];
         let mut row = vec![0.0; count];
         for j in 0..n {
             for i in j..n {
                 let distance = metric.distance(x[i], x[j]);
+                row.fill(0.0);
                 let value = if derivatives {
-                    kernel.value_and_gradient(distance, &mut row)
+                    kernel.add_gradient(distance, 1.0, &mut row)
                 } else {
                     kernel.value(distance)
                 };
@@ -357,7 +358,7 @@ impl LatticeGp {
                 for (out, &x) in column.iter_mut().zip(points) {
                     *out = self.data.metrics[k].distance(x, node);
                 }
-                self.hyper.kernels[k].values_in_place(column);
+                self.hyper.kernels[k].fill(column);
             }
         }
         out
@@ -497,7 +498,7 @@ mod tests {
 
     /// Every closed and general shape in some axis, sums, both metrics.
     fn cases() -> Vec<LatticeHyper> {
-        let single = Kernel1d::single;
+        let single = Kernel1d::new;
         let sum = Kernel1d {
             terms: vec![
                 Term1d { weight: 1.0, shape: Shape::Matern52, length_scale: 0.9 },
@@ -625,14 +626,14 @@ mod tests {
                     ..hyper.clone()
                 });
                 for k in 0..3 {
-                    let start: Vec<f64> = hyper.kernels[k].parameters().iter().map(|p| p.log_value).collect();
+                    let start: Vec<f64> = hyper.kernels[k].log_parameters();
                     assert_eq!(at.d_axes[k].len(), start.len());
                     for (i, &slope) in at.d_axes[k].iter().enumerate() {
                         check(slope, &|s| {
                             let mut moved = hyper.clone();
                             let mut p = start.clone();
                             p[i] += s;
-                            moved.kernels[k].set_log_parameters(&p);
+                            moved.kernels[k].set_log_parameters(&p).unwrap();
                             moved
                         });
                     }

@@ -29,7 +29,7 @@ pub struct FitReport {
 }
 
 /// The smallest ratio of noise to signal variance, which keeps the covariance positive definite in f64.
-const MIN_NOISE_RATIO: f64 = 1e-9;
+pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
 
 /// Fits a lattice process: kernels start from `kernels`, whose length scales are taken relative to the extent of
 /// each axis if `relative_start` holds.
@@ -97,20 +97,16 @@ impl Problem {
             let extent = x.iter().copied().fold(f64::NEG_INFINITY, f64::max)
                 - x.iter().copied().fold(f64::INFINITY, f64::min);
             let extent = extent.max(f64::MIN_POSITIVE.sqrt());
-            for info in kernel.parameters() {
-                let (lower, upper) = match info.kind {
-                    ParameterKind::LengthScale => {
-                        ((0.7 * extent / x.len() as f64).ln(), (20.0 * extent).ln())
-                    }
-                    ParameterKind::Alpha => (0.05f64.ln(), 1e3f64.ln()),
-                    ParameterKind::Weight => (1e-5f64.ln(), 1e5f64.ln()),
+            let kinds = kernel.parameter_kinds(k).into_iter();
+            for ((kind, name), start) in kinds.zip(kernel.parameter_names()).zip(kernel.log_parameters()) {
+                let (lower, upper) = match kind {
+                    // Below the spacing of the nodes a length scale means nothing.
+                    ParameterKind::LengthScale(_) => (0.7 * extent / x.len() as f64, 20.0 * extent),
+                    ParameterKind::Alpha => (0.05, 1e3),
+                    ParameterKind::Weight | ParameterKind::Variance => (1e-5, 1e5),
                 };
-                parameters.push(Parameter {
-                    name: format!("{}.{}", AXIS_NAMES[k], info.name),
-                    start: info.log_value,
-                    lower,
-                    upper,
-                });
+                let name = format!("{}.{name}", AXIS_NAMES[k]);
+                parameters.push(Parameter { name, start, lower: lower.ln(), upper: upper.ln() });
             }
         }
         parameters.push(match self.noise {
@@ -131,14 +127,14 @@ impl Problem {
     }
 
     /// Writes log-parameters into the kernels; returns the last one, which is not a kernel's.
-    fn set(&mut self, log_parameters: &[f64]) -> f64 {
+    fn set(&mut self, log_parameters: &[f64]) -> Result<f64> {
         let mut rest = log_parameters;
         for kernel in &mut self.kernels {
-            let (own, others) = rest.split_at(kernel.parameter_count());
-            kernel.set_log_parameters(own);
+            let (own, others) = rest.split_at(kernel.n_parameters());
+            kernel.set_log_parameters(own)?;
             rest = others;
         }
-        rest[0]
+        Ok(rest[0])
     }
 
     fn search(
@@ -148,7 +144,7 @@ impl Problem {
         options: &OptimizeOptions,
     ) -> Result<Optimum> {
         maximize(parameters, data.targets.len(), options, |p| {
-            let last = self.set(p).exp();
+            let last = self.set(p)?.exp();
             let (likelihood, slope) = match self.noise {
                 Noise::Optimized => {
                     let (_, l) = data.profile_likelihood(&self.kernels, last)?;
@@ -171,7 +167,7 @@ impl Problem {
 
     /// The hyper-parameters at a result.
     fn hyper(&mut self, data: &LatticeData, log_parameters: &[f64]) -> Result<LatticeHyper> {
-        let last = self.set(log_parameters).exp();
+        let last = self.set(log_parameters)?.exp();
         let (signal_variance, noise_variance) = match self.noise {
             Noise::Optimized => {
                 let (signal_variance, _) = data.profile_likelihood(&self.kernels, last)?;

@@ -2,7 +2,15 @@
 
 mod axis;
 mod bessel;
+mod composite;
+mod rows;
 mod shape;
+mod slices;
 
-pub use axis::{AxisMetric, Kernel1d, ParameterInfo, ParameterKind, Term1d};
+pub use axis::{Kernel1d, ParameterKind, Term1d};
+pub use composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
+pub(crate) use rows::{Points, RowScratch};
 pub use shape::Shape;
+
+#[cfg(test)]
+pub(crate) use composite::tests::kernels as test_kernels;

@@ -1,0 +1,159 @@
+//! Hyper-parameters of the dense process by maximum marginal likelihood.
+
+use crate::error::{Error, Result};
+use crate::gp::dense::{DenseEvaluator, DenseGp};
+use crate::gp::lattice_fit::{FitReport, MIN_NOISE_RATIO, Noise};
+use crate::gp::optimize::{OptimizeOptions, Parameter, maximize};
+use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
+
+/// Fits a dense process with a sum of ARD kernels, one of each of `shapes`, to `x`, `n` rows of `metrics.len()`
+/// coordinates, and `targets`, `n` zero-mean values a channel; the channels share hyper-parameters.
+///
+/// The search runs over variances, length scales, mixture parameters and, with [`Noise::Optimized`], the noise
+/// variance. One evaluation costs `n^3 / 2` multiply-adds, and there are some tens of them; see
+/// [`dense_cost`](crate::dense_cost) for a forecast.
+///
+/// # Errors
+/// Sizes that do not agree, values that are not finite, broken shapes or noise, or more samples than fit in memory.
+pub fn fit_dense(
+    x: &[f64],
+    targets: &[Vec<f64>],
+    metrics: &[AxisMetric],
+    shapes: &[Shape],
+    noise: Noise,
+    options: &OptimizeOptions,
+) -> Result<(DenseGp, FitReport)> {
+    let channels = targets.len();
+    let n = targets.first().map_or(0, Vec::len);
+    if channels == 0 || targets.iter().any(|t| t.len() != n) {
+        return Err(Error::argument("dense targets", "channels of one length, at least one", channels));
+    }
+    if let Noise::Fixed(variance) = noise
+        && !(variance > 0.0 && variance.is_finite())
+    {
+        return Err(Error::argument("noise variance", "a positive number", variance));
+    }
+    shapes.iter().try_for_each(|shape| shape.validate())?;
+    let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
+    let variance = (y.iter().map(|y| y * y).sum::<f64>() / y.len().max(1) as f64).max(1e-12);
+    let dimension = metrics.len();
+    let mut evaluator = DenseEvaluator::new(x, dimension, &y, channels)?;
+    let extents: Vec<f64> = (0..dimension).map(|k| extent(x, dimension, k, metrics[k])).collect();
+    let mut kernel = starting_kernel(&extents, metrics, shapes, variance);
+    let mut parameters = parameters(&kernel, &extents, variance);
+    if noise == Noise::Optimized {
+        parameters.push(Parameter {
+            name: "noise_variance".into(),
+            start: (1e-3 * variance).ln(),
+            lower: (MIN_NOISE_RATIO * variance).ln(),
+            upper: (10.0 * variance).ln(),
+        });
+    }
+    let count = kernel.n_parameters();
+    let noise_of = |p: &[f64]| match noise {
+        Noise::Optimized => p[count].exp(),
+        Noise::Fixed(variance) => variance,
+    };
+    let found = maximize(&parameters, y.len(), options, |p| {
+        kernel.set_log_parameters(&p[..count])?;
+        let mut at = evaluator.evaluate_with_gradient(&kernel, noise_of(p))?;
+        at.gradient.truncate(p.len());
+        Ok((at.log_marginal_likelihood, at.gradient))
+    })?;
+    // Its matrix makes room for the process's own.
+    drop(evaluator);
+    kernel.set_log_parameters(&found.log_parameters[..count])?;
+    let gp = DenseGp::fit_at(x, &y, channels, kernel, noise_of(&found.log_parameters))?;
+    let report = FitReport {
+        log_marginal_likelihood: found.value,
+        evaluations: found.evaluations,
+        converged: found.converged,
+        at_bound: found.at_bound,
+    };
+    Ok((gp, report))
+}
+
+/// The extent of coordinate `k`, at least a small positive number.
+fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
+    match metric {
+        AxisMetric::Chord => 1.0,
+        AxisMetric::Linear => {
+            let column = || x.iter().skip(k).step_by(dimension).copied();
+            let (low, high) =
+                (column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max));
+            (high - low).max(1e-3)
+        }
+    }
+}
+
+fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], variance: f64) -> Kernel {
+    let share = variance / shapes.len().max(1) as f64;
+    let terms = shapes.iter().enumerate().map(|(i, &shape)| {
+        // Terms of one shape need different starts to become different.
+        let fraction = 0.5 * 0.5f64.powi(i32::try_from(i).unwrap_or(30));
+        let length_scale = extents.iter().map(|extent| fraction * extent).collect();
+        KernelTerm { variance: share, body: KernelBody::Ard { shape, length_scale } }
+    });
+    Kernel { terms: terms.collect(), metric: metrics.to_vec() }
+}
+
+fn parameters(kernel: &Kernel, extents: &[f64], variance: f64) -> Vec<Parameter> {
+    let kinds = kernel.parameter_kinds().into_iter();
+    kinds
+        .zip(kernel.parameter_names())
+        .zip(kernel.log_parameters())
+        .map(|((kind, name), start)| {
+            let (lower, upper) = match kind {
+                ParameterKind::Variance => (1e-4 * variance, 1e6 * variance),
+                ParameterKind::LengthScale(k) => (1e-2 * extents[k], 30.0 * extents[k]),
+                ParameterKind::Alpha => (0.05, 1e3),
+                ParameterKind::Weight => (1e-5, 1e5),
+            };
+            Parameter { name, start, lower: lower.ln(), upper: upper.ln() }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A smooth function of two coordinates with noise of a known size, on a quasi-random set.
+    fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
+        let mut random = crate::gp::optimize::SplitMix64(2);
+        let x: Vec<f64> = (0..2 * n).map(|_| random.next_unit()).collect();
+        let noise = |r: &mut crate::gp::optimize::SplitMix64| {
+            0.05 * (0..12).map(|_| r.next_unit() - 0.5).sum::<f64>()
+        };
+        let y = x.chunks(2).map(|p| (4.0 * p[0]).sin() + 0.1 * p[1] + noise(&mut random)).collect();
+        (x, y)
+    }
+
+    #[test]
+    fn recovers_noise_and_relevance() {
+        let (x, y) = data(150);
+        let metrics = [AxisMetric::Linear; 2];
+        let shapes = [Shape::SquaredExponential];
+        let options = OptimizeOptions::default();
+        let (gp, report) = fit_dense(&x, &[y], &metrics, &shapes, Noise::Optimized, &options).unwrap();
+        assert!(report.converged, "{report:?}");
+        assert!((gp.noise_variance().sqrt() - 0.05).abs() < 0.01, "{}", gp.noise_variance().sqrt());
+        let KernelBody::Ard { length_scale, .. } = &gp.kernel().terms[0].body else { unreachable!() };
+        assert!(length_scale[1] > 3.0 * length_scale[0], "{length_scale:?}");
+        assert!((gp.log_marginal_likelihood() - report.log_marginal_likelihood).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fixed_noise_stays_and_broken_input_is_refused() {
+        let (x, y) = data(40);
+        let metrics = [AxisMetric::Linear; 2];
+        let options = OptimizeOptions::default();
+        let shapes = [Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }];
+        let both = [y.clone(), y.iter().map(|y| -y).collect()];
+        let (gp, _) = fit_dense(&x, &both, &metrics, &shapes, Noise::Fixed(0.01), &options).unwrap();
+        assert_eq!((gp.noise_variance(), gp.channels(), gp.n_samples()), (0.01, 2, 40));
+        assert!(fit_dense(&x, &[], &metrics, &shapes, Noise::Optimized, &options).is_err());
+        assert!(fit_dense(&x, &[y.clone()], &metrics, &shapes, Noise::Fixed(-1.0), &options).is_err());
+        assert!(fit_dense(&x[1..], &[y], &metrics, &shapes, Noise::Optimized, &options).is_err());
+    }
+}

@@ -1,0 +1,126 @@
+//! Cholesky factors of covariance matrices, with a jitter ladder.
+//!
+//! Matrices are column-major and `n x n`; only the lower triangle is written or read.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::kernel::{Kernel, Points, RowScratch};
+
+/// Jitters tried in turn, relative to the mean of the diagonal.
+pub(super) const JITTERS: [f64; 8] = [0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6];
+
+/// Columns a task assembles at a time.
+const COLUMNS: usize = 16;
+
+/// Writes the lower triangle of `K + diagonal I` into `out`, column-major.
+///
+/// Cost: one kernel evaluation a pair, in parallel.
+pub(super) fn assemble(kernel: &Kernel, points: &Points, diagonal: f64, out: &mut [f64]) {
+    let n = points.len();
+    out.par_chunks_mut(n * COLUMNS).enumerate().for_each_init(
+        || RowScratch::new(kernel.dimension()),
+        |scratch, (block, columns)| {
+            for (column, j) in columns.chunks_mut(n).zip(block * COLUMNS..) {
+                kernel.row(points, j..n, points, j, scratch, &mut column[j..]);
+                column[j] += diagonal;
+            }
+        },
+    );
+}
+
+/// Replaces the lower triangle by the Cholesky factor; false where a pivot is not positive.
+pub(super) fn factorize(mut matrix: MatMut<'_, f64>) -> bool {
+    let n = matrix.nrows();
+    let par = Par::rayon(0);
+    let mut buffer = MemBuffer::new(cholesky_in_place_scratch::<f64>(n, par, faer::Spec::default()));
+    let stack = MemStack::new(&mut buffer);
+    let done = cholesky_in_place(matrix.as_mut(), Default::default(), par, stack, faer::Spec::default());
+    done.is_ok() && (0..n).all(|i| matrix[(i, i)] > 0.0 && matrix[(i, i)].is_finite())
+}
+
+/// Writes the Cholesky factor of `K + (noise_variance + jitter) I` into `out` and returns the jitter, the smallest
+/// of the ladder that makes the matrix positive definite.
+pub(super) fn assemble_and_factorize(
+    kernel: &Kernel,
+    points: &Points,
+    noise_variance: f64,
+    out: &mut [f64],
+) -> Result<f64> {
+    let n = points.len();
+    let mean_diagonal = kernel.prior_variance() + noise_variance;
+    for relative in JITTERS {
+        let jitter = relative * mean_diagonal;
+        assemble(kernel, points, noise_variance + jitter, out);
+        if factorize(MatMut::from_column_major_slice_mut(out, n, n)) {
+            return Ok(jitter);
+        }
+    }
+    Err(Error::NotPositiveDefinite { size: n, largest_jitter: JITTERS[JITTERS.len() - 1] })
+}
+
+/// `sum_i ln L_ii`, half the log-determinant.
+pub(super) fn half_log_det(factor: &[f64], n: usize) -> f64 {
+    factor.iter().step_by(n + 1).map(|l| l.ln()).sum()
+}
+
+/// `(L L^T)^-1 y` for every column of `y`, in place.
+pub(super) fn solve(factor: &[f64], n: usize, y: &mut [f64]) {
+    let factor = MatRef::from_column_major_slice(factor, n, n);
+    let columns = y.len() / n;
+    let mut y = MatMut::from_column_major_slice_mut(y, n, columns);
+    solve_lower_triangular_in_place(factor, y.as_mut(), Par::Seq);
+    solve_upper_triangular_in_place(factor.transpose(), y, Par::Seq);
+}
+
+/// `L^-1 y` for every column of `y`, in place, in the calling thread.
+pub(super) fn solve_lower(factor: &[f64], n: usize, y: &mut [f64]) {
+    let columns = y.len() / n;
+    let y = MatMut::from_column_major_slice_mut(y, n, columns);
+    solve_lower_triangular_in_place(MatRef::from_column_major_slice(factor, n, n), y, Par::Seq);
+}
+
+/// Columns of the inverse a task forms at a time.
+pub(super) const INVERSE_COLUMNS: usize = 128;
+
+/// Writes columns `first..first + width` of `L^-1`, from row `first` on, into `out`: column-major,
+/// `(n - first) x width`. What stands above is zero.
+///
+/// Cost: `(n - first)^2 width / 2` multiply-adds, in the calling thread.
+pub(super) fn inverse_factor_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
+    let rows = n - first;
+    let factor = MatRef::from_column_major_slice(factor, n, n).submatrix(first, first, rows, rows);
+    let (corner, _, left, rest) = factor.split_at(width, width);
+    out.fill(0.0);
+    let (mut top, mut bottom) = MatMut::from_column_major_slice_mut(out, rows, width).split_at_row_mut(width);
+    invert_lower_triangular(top.as_mut(), corner, Par::Seq);
+    // [A 0; B C]^-1 = [A^-1 0; -C^-1 B A^-1 C^-1].
+    matmul(bottom.as_mut(), Accum::Replace, left, top.as_ref(), -1.0, Par::Seq);
+    solve_lower_triangular_in_place(rest, bottom, Par::Seq);
+}
+
+/// Writes columns `first..first + width` of `(L L^T)^-1`, from row `first` on, into `out`, shaped as in
+/// [`inverse_factor_columns`].
+///
+/// Solving with `L^T` upwards, the rows from `first` on need no row above. Cost: `(n - first)^2 width` multiply-adds,
+/// in the calling thread; `n^3 / 3` over all columns, as by way of the whole `L^-1`, but without a second matrix and
+/// with nothing to wait for between the blocks.
+pub(super) fn inverse_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
+    inverse_factor_columns(factor, n, first, width, out);
+    let rows = n - first;
+    let factor = MatRef::from_column_major_slice(factor, n, n).submatrix(first, first, rows, rows);
+    let out = MatMut::from_column_major_slice_mut(out, rows, width);
+    solve_upper_triangular_in_place(factor.transpose(), out, Par::Seq);
+}
+
+/// The blocks of [`INVERSE_COLUMNS`] columns of `n`: first column and width.
+pub(super) fn inverse_blocks(n: usize) -> impl IndexedParallelIterator<Item = (usize, usize)> {
+    let block = move |b| (b * INVERSE_COLUMNS, INVERSE_COLUMNS.min(n - b * INVERSE_COLUMNS));
+    (0..n.div_ceil(INVERSE_COLUMNS)).into_par_iter().with_max_len(1).map(block)
+}
