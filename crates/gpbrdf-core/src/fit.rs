@@ -98,7 +98,8 @@ pub fn detect_symmetry(brdf: &dyn Brdf) -> Symmetry {
             let side = |phi| brdf.eval_half_diff(crate::BoxPoint { u, v, phi }.to_half_diff());
             let (a, b) = (side(phi), side(std::f64::consts::PI - phi));
             let target = Transform::default();
-            sum += a.iter().zip(b).map(|(&a, b)| (target.forward(a) - target.forward(b)).powi(2)).sum::<f64>();
+            sum +=
+                a.iter().zip(b).map(|(&a, b)| (target.forward(a) - target.forward(b)).powi(2)).sum::<f64>();
         }
     }
     let count = 3 * lattice.len();
@@ -164,7 +165,11 @@ impl Default for FitOptions {
 /// # Errors
 /// No samples, values that are not finite, broken options, the lattice solver on samples that stand on no lattice, or
 /// a dense run that will not fit.
-pub fn fit(samples: &SampleSet, options: &FitOptions, provenance: Provenance) -> Result<(Model, Vec<FitReport>)> {
+pub fn fit(
+    samples: &SampleSet,
+    options: &FitOptions,
+    provenance: Provenance,
+) -> Result<(Model, Vec<FitReport>)> {
     let n = samples.angles.len();
     if n == 0 || samples.values.len() != n {
         return Err(Error::argument("samples", "at least one, with as many values as directions", n));
@@ -177,9 +182,8 @@ pub fn fit(samples: &SampleSet, options: &FitOptions, provenance: Provenance) ->
     }
     options.kernel.iter().try_for_each(|shape| shape.validate())?;
     options.transform.validate()?;
-    let mut targets: Vec<Vec<f64>> = (0..3)
-        .map(|c| samples.values.iter().map(|v| options.transform.forward(v[c])).collect())
-        .collect();
+    let mut targets: Vec<Vec<f64>> =
+        (0..3).map(|c| samples.values.iter().map(|v| options.transform.forward(v[c])).collect()).collect();
     let mut offsets = [0.0; 3];
     for (offset, targets) in offsets.iter_mut().zip(&mut targets) {
         *offset = options.mean.offset(targets);
@@ -190,8 +194,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions, provenance: Provenance) ->
 
     let (space, process, reports) = match (options.solver, &samples.lattice) {
         (Solver::Auto | Solver::Lattice, Some(lattice)) => {
-            let space =
-                InputSpace::WarpedBox { density: lattice.node_density, symmetry: lattice.symmetry };
+            let space = InputSpace::WarpedBox { density: lattice.node_density, symmetry: lattice.symmetry };
             let [u, v, phi] = lattice.nodes();
             let coordinates = [u.into_iter().map(|u| space.warp_u(u)).collect(), v, phi];
             let kernels = coordinates.each_ref().map(|x: &Vec<f64>| starting_kernel(&options.kernel, x));
@@ -218,7 +221,14 @@ pub fn fit(samples: &SampleSet, options: &FitOptions, provenance: Provenance) ->
             space.validate()?;
             let points: Vec<[f64; 3]> = samples.angles.iter().map(|&a| space.coordinates(a)).collect();
             let fitted = groups.into_iter().map(|targets| {
-                fit_dense(points.as_flattened(), &targets, &space.metrics(), &options.kernel, options.noise, &options.optimize)
+                fit_dense(
+                    points.as_flattened(),
+                    &targets,
+                    &space.metrics(),
+                    &options.kernel,
+                    options.noise,
+                    &options.optimize,
+                )
             });
             let (gps, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
             (space, Process::Dense(gps), reports)

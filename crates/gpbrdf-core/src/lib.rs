@@ -57,13 +57,12 @@ pub use formats::samples_csv::{
 pub use formats::table_exr::{ExrChannels, ExrPart, read_table_exr, write_table_exr, write_table_exr_to};
 pub use formats::{FileKind, recognise, sha256_file, sha256_hex};
 pub use gp::{
-    DenseCost, DenseEvaluator, DenseGp, DenseLikelihood, FitReport, LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood, LeaveOneOut, Noise, OptimizeOptions,
-    Optimum, Parameter, dense_cost, fit_dense, fit_lattice, maximize,
+    DenseCost, DenseEvaluator, DenseGp, DenseLikelihood, FitReport, LatticeData, LatticeGp, LatticeHyper,
+    LatticeLikelihood, LeaveOneOut, Noise, OptimizeOptions, Optimum, Parameter, dense_cost, fit_dense,
+    fit_lattice, maximize,
 };
 pub use image_metrics::{ImageMetrics, PixelDifference, exposure_of, psnr, ssim};
-pub use kernel::{
-    AxisMetric, Kernel, Kernel1d, KernelBody, KernelTerm, ParameterKind, Shape, Term1d,
-};
+pub use kernel::{AxisMetric, Kernel, Kernel1d, KernelBody, KernelTerm, ParameterKind, Shape, Term1d};
 pub use layout::{LatticeLayout, Symmetry, random_cells, random_directions};
 pub use materials::{Material, material, materials};
 pub use metrics::{CellMetrics, Interval, Metrics};

@@ -99,7 +99,10 @@ impl Model {
             Process::Dense(groups) => {
                 for gp in groups {
                     let means = gp.predict_mean(points.as_flattened());
-                    add(&means.unwrap_or_else(|_| vec![f64::NAN; points.len() * gp.channels()]), gp.channels());
+                    add(
+                        &means.unwrap_or_else(|_| vec![f64::NAN; points.len() * gp.channels()]),
+                        gp.channels(),
+                    );
                 }
             }
         }

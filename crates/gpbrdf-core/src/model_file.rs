@@ -141,7 +141,8 @@ impl Model {
         let header: Header =
             serde_json::from_str(json).map_err(|e| wrong("metadata of a model", e.to_string()))?;
         let read = |name: String| -> Result<Vec<f64>> {
-            let tensor = tensors.tensor(&name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
+            let tensor =
+                tensors.tensor(&name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
             if tensor.dtype() != Dtype::F64 {
                 return Err(wrong(&format!("f64 in tensor \"{name}\""), format!("{:?}", tensor.dtype())));
             }
@@ -149,7 +150,10 @@ impl Model {
             let values: Vec<f64> = chunks.iter().map(|b| f64::from_le_bytes(*b)).collect();
             match values.iter().position(|x| !x.is_finite()) {
                 None => Ok(values),
-                Some(i) => Err(wrong(&format!("finite numbers in tensor \"{name}\""), format!("{} at {i}", values[i]))),
+                Some(i) => Err(wrong(
+                    &format!("finite numbers in tensor \"{name}\""),
+                    format!("{} at {i}", values[i]),
+                )),
             }
         };
         let damaged = |e: Error| wrong("a consistent model", e.to_string());
@@ -166,7 +170,8 @@ impl Model {
                     let coordinates = [u?, v?, phi?];
                     let nodes: usize = coordinates.iter().map(Vec::len).product();
                     let channels = targets.len() / nodes.max(1);
-                    let data = LatticeData { coordinates, metrics: header.space.metrics(), targets, channels };
+                    let data =
+                        LatticeData { coordinates, metrics: header.space.metrics(), targets, channels };
                     LatticeGp::from_weights(data, hyper, read(format!("{g}.weights"))?).map_err(damaged)
                 });
                 Process::Lattice(groups.collect::<Result<_>>()?)

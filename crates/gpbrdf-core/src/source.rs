@@ -142,7 +142,9 @@ impl Source {
     /// The file's path or `built-in NAME`, for reports.
     #[must_use]
     pub fn origin(&self) -> String {
-        self.path.as_ref().map_or_else(|| format!("built-in {}", self.name), |path| path.display().to_string())
+        self.path
+            .as_ref()
+            .map_or_else(|| format!("built-in {}", self.name), |path| path.display().to_string())
     }
 }
 

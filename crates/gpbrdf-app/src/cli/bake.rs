@@ -58,8 +58,8 @@ impl Bake {
         let mut seconds = Seconds::default();
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
         let environment = environment(self.env.as_deref())?;
-        let samples =
-            seconds.measure("sample", || terminal.stage("sampling", || self.model.sample(&source, terminal)))?;
+        let samples = seconds
+            .measure("sample", || terminal.stage("sampling", || self.model.sample(&source, terminal)))?;
         let options = self.model.fit_options()?;
         let provenance = Provenance {
             material: source.name.clone(),
@@ -119,10 +119,8 @@ impl Bake {
         let (mut binary, mut exr, mut safetensors) =
             (create("table.binary")?, create("table.exr")?, create("model.safetensors")?);
         // Disk and processor at once.
-        let (binary_written, exr_written) = rayon::join(
-            || write_merl_to(&mut binary, &baked.mean),
-            || write_exr(&mut exr, baked, truth),
-        );
+        let (binary_written, exr_written) =
+            rayon::join(|| write_merl_to(&mut binary, &baked.mean), || write_exr(&mut exr, baked, truth));
         binary_written?;
         exr_written?;
         std::io::Write::write_all(&mut safetensors, &model.to_bytes()?)?;
@@ -183,7 +181,8 @@ fn write_exr(file: &mut AtomicFile, baked: &Baked, truth: Option<&BrdfTable>) ->
         unit: "sr^-1",
         channels: ExrChannels::Rgb(values),
     };
-    let mut parts = vec![rgb("mean", "predictive mean of the BRDF (median of the value)", baked.mean.values())];
+    let mut parts =
+        vec![rgb("mean", "predictive mean of the BRDF (median of the value)", baked.mean.values())];
     let per_channel;
     if let Some(sigma) = &baked.sigma {
         let channels = match sigma.planes() {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args;
 use gpbrdf_core::{
-    Content, ExrChannels, ExrPart, LatticeLayout, Layout, Sample, SampleSet, Samples, detect_symmetry, write_merl,
-    write_samples_csv, write_table_exr,
+    Content, ExrChannels, ExrPart, LatticeLayout, Layout, Sample, SampleSet, Samples, detect_symmetry,
+    write_merl, write_samples_csv, write_table_exr,
 };
 
 use super::input::open;
@@ -30,7 +30,10 @@ impl Convert {
         match extension.as_str() {
             "binary" | "exr" => {
                 let Some(table) = terminal.stage("tabulating", || source.table()) else {
-                    bail!("{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead", source.origin());
+                    bail!(
+                        "{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead",
+                        source.origin()
+                    );
                 };
                 if extension == "binary" {
                     write_merl(&self.output, &table)?;

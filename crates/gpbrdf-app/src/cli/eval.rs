@@ -4,14 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use gpbrdf_core::{
-    BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma, interval_95,
-};
+use gpbrdf_core::{BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma, interval_95};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
-use super::report::metric_lines;
+use super::report::{metric_lines, significant};
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
@@ -35,8 +33,6 @@ struct Evaluation {
     truth: String,
     metrics: Value,
 }
-
-
 
 impl Eval {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
@@ -66,7 +62,8 @@ impl Eval {
                 });
                 (ends.map(|e| e.0), ends.map(|e| e.1))
             };
-            terminal.stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
+            terminal
+                .stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
         } else {
             let predicted = table(&prediction)?;
             terminal.stage("comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
@@ -115,12 +112,17 @@ impl Eval {
         if self.json {
             return self.print(terminal, prediction, truth, metrics);
         }
-        terminal.summary(&format!("{} against {} samples of {}", prediction.origin(), angles.len(), truth.origin()))?;
         terminal.summary(&format!(
-            "  median |ln error| {:.4}, rms ln error {rmse:.4}, MAE {:.4g} /sr, MSE {:.4g} /sr^2\n  95 % interval covers {:.1} % of the samples",
+            "{} against {} samples of {}",
+            prediction.origin(),
+            angles.len(),
+            truth.origin()
+        ))?;
+        terminal.summary(&format!(
+            "  median |ln error| {:.4}, rms ln error {rmse:.4}, MAE {} /sr, MSE {} /sr^2\n  95 % interval covers {:.1} % of the samples",
             logs[logs.len() / 2],
-            absolute / n,
-            square / n,
+            significant(absolute / n),
+            significant(square / n),
             100.0 * covered as f64 / n
         ))
     }

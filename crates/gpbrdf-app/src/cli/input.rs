@@ -36,11 +36,16 @@ pub(crate) struct OutputFolder {
 
 impl OutputFolder {
     pub(crate) fn create(path: &Path) -> Result<Self> {
-        let mut created: Vec<PathBuf> =
-            path.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists()).map(Path::to_owned).collect();
+        let mut created: Vec<PathBuf> = path
+            .ancestors()
+            .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
+            .map(Path::to_owned)
+            .collect();
         if let Err(source) = std::fs::create_dir_all(path) {
             created.iter().for_each(|p| drop(std::fs::remove_dir(p)));
-            return Err(anyhow::Error::new(source).context(format!("cannot create folder \"{}\"", path.display())));
+            return Err(
+                anyhow::Error::new(source).context(format!("cannot create folder \"{}\"", path.display()))
+            );
         }
         created.retain(|p| p.exists());
         Ok(Self { path: path.to_owned(), created })

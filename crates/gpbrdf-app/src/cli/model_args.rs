@@ -167,7 +167,8 @@ impl ModelArgs {
 
     /// The options of the fit.
     pub(crate) fn fit_options(&self) -> Result<FitOptions> {
-        let kernel = self.kernel.split('+').map(|name| self.shape(name.trim())).collect::<Result<Vec<_>>>()?;
+        let kernel =
+            self.kernel.split('+').map(|name| self.shape(name.trim())).collect::<Result<Vec<_>>>()?;
         let symmetry = match self.symmetry {
             SymmetryName::Reciprocal => Symmetry::Reciprocal,
             SymmetryName::Auto | SymmetryName::Bilateral => Symmetry::Bilateral,
@@ -192,7 +193,11 @@ impl ModelArgs {
             noise: self.noise.0,
             per_channel: self.per_channel,
             space: InputSpace::WarpedBox { density, symmetry },
-            optimize: OptimizeOptions { restarts: self.restarts, seed: self.seed, ..OptimizeOptions::default() },
+            optimize: OptimizeOptions {
+                restarts: self.restarts,
+                seed: self.seed,
+                ..OptimizeOptions::default()
+            },
         })
     }
 

@@ -48,7 +48,8 @@ impl Predict {
             None => terminal.print(&text),
             Some(path) => {
                 let mut file = AtomicFile::create(path)?;
-                file.write_all(text.as_bytes()).with_context(|| format!("cannot write \"{}\"", path.display()))?;
+                file.write_all(text.as_bytes())
+                    .with_context(|| format!("cannot write \"{}\"", path.display()))?;
                 file.commit()?;
                 terminal.summary(&format!("wrote {} predictions to {}", predictions.len(), path.display()))
             }

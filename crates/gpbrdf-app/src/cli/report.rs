@@ -120,14 +120,28 @@ pub(crate) fn metric_lines(m: &Metrics) -> Vec<String> {
             images.psnr_env, images.psnr_point, images.ssim_env
         ),
         format!(
-            "  cells: median |ln error| {:.4}, rms ln error {:.4}, MAE {:.4g} /sr, MSE {:.4g} /sr^2",
-            cells.median_abs_log, cells.log_rmse, cells.mae, cells.mse
+            "  cells: median |ln error| {:.4}, rms ln error {:.4}, MAE {} /sr, MSE {} /sr^2",
+            cells.median_abs_log,
+            cells.log_rmse,
+            significant(cells.mae),
+            significant(cells.mse)
         ),
     ];
     if let Some(coverage) = cells.coverage_95 {
         lines.push(format!("  95 % interval covers {:.1} % of the cells", 100.0 * coverage));
     }
     lines
+}
+
+/// Four significant digits.
+pub(crate) fn significant(x: f64) -> String {
+    if x != 0.0 && !(1e-3..1e5).contains(&x.abs()) {
+        return format!("{x:.3e}");
+    }
+    let digits = if x == 0.0 { 0.0 } else { (3.0 - x.abs().log10().floor()).max(0.0) };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 6")]
+    let digits = digits as usize;
+    format!("{x:.digits$}")
 }
 
 /// Solver, kernel and hyper-parameters of a model.

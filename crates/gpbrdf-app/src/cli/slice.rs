@@ -71,12 +71,20 @@ impl SliceCommand {
 fn table(source: &Source) -> Result<BrdfTable> {
     match source.table() {
         Some(table) => Ok(table.into_owned()),
-        None => bail!("{}: expected a BRDF that can be asked anywhere, found scattered samples; fit them first", source.origin()),
+        None => bail!(
+            "{}: expected a BRDF that can be asked anywhere, found scattered samples; fit them first",
+            source.origin()
+        ),
     }
 }
 
 /// Writes the values of the slice, or prediction minus truth, as linear RGB.
-fn write_exr(path: &Path, prediction: &BrdfTable, truth: Option<&BrdfTable>, options: &SliceOptions) -> Result<()> {
+fn write_exr(
+    path: &Path,
+    prediction: &BrdfTable,
+    truth: Option<&BrdfTable>,
+    options: &SliceOptions,
+) -> Result<()> {
     let mut values = Slice::new(prediction, options).values().to_vec();
     if let Some(truth) = truth {
         for (value, truth) in values.iter_mut().zip(Slice::new(truth, options).values()) {

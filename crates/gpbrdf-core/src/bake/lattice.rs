@@ -21,14 +21,14 @@ use crate::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 /// Distinct `|cos phi_d|` of the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
 const N_COLUMNS: usize = N_PHI_D / 2;
 
-/// Hands the means of every column to `emit`: the slab of its `i_theta_h` out of `slabs`, `i_phi_d` and the means
-/// `[channel][i_theta_d]`. Slabs run in parallel; each is written by one task.
+/// Hands the means of every column to `emit`: the slab of its `i_theta_h` out of `slabs`, each `i_phi_d` that
+/// the column serves, and the means `[channel][i_theta_d]`. Slabs run in parallel; each is written by one task.
 pub(super) fn bake_means<S: Send>(
     gp: &LatticeGp,
     space: InputSpace,
     symmetry: Symmetry,
     slabs: impl IndexedParallelIterator<Item = S>,
-    emit: impl Fn(&mut S, usize, &mut [f64]) + Sync,
+    emit: impl Fn(&mut S, &[usize], &mut [f64]) + Sync,
 ) {
     let nodes: usize = gp.data().len();
     let along_u = gp.cross(0, &u_coordinates(space));
@@ -38,13 +38,13 @@ pub(super) fn bake_means<S: Send>(
     slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
         let weights: Vec<Mat<f64>> = contracted.iter().map(|m| contract_phi(gp, m, i, &along_phi)).collect();
         let mut means = vec![0.0; weights.len() * N_THETA_D];
-        for (j, rows) in column_rows(symmetry) {
+        for j in 0..N_COLUMNS {
             column.fill(gp, i, j);
-            for (source, target) in rows {
+            for (row, targets) in mirrored_rows(symmetry, j) {
                 for (weights, means) in weights.iter().zip(means.chunks_mut(N_THETA_D)) {
-                    column.sum_means(weights, source, means);
+                    column.sum_means(weights, row, means);
                 }
-                emit(&mut slab, target, &mut means);
+                emit(&mut slab, &targets, &mut means);
             }
         }
     });
@@ -56,7 +56,7 @@ pub(super) fn bake_variances<S: Send>(
     space: InputSpace,
     symmetry: Symmetry,
     slabs: impl IndexedParallelIterator<Item = S>,
-    emit: impl Fn(&mut S, usize, &[f64]) + Sync,
+    emit: impl Fn(&mut S, &[usize], &[f64]) + Sync,
 ) {
     let mut along_u = &gp.cross(0, &u_coordinates(space)) * &gp.eigen[0].vectors;
     let mut along_phi = &gp.cross(2, &phi_coordinates(symmetry)) * &gp.eigen[2].vectors;
@@ -67,12 +67,12 @@ pub(super) fn bake_variances<S: Send>(
     slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
         let weights = contract_phi(gp, &contracted, i, &along_phi);
         let mut variances = vec![0.0; N_THETA_D];
-        for (j, rows) in column_rows(symmetry) {
+        for j in 0..N_COLUMNS {
             column.fill(gp, i, j);
             column.project(&gp.eigen[1].vectors);
-            for (source, target) in rows {
-                column.sum_variances(&weights, source, prior, scale, &mut variances);
-                emit(&mut slab, target, &variances);
+            for (row, targets) in mirrored_rows(symmetry, j) {
+                column.sum_variances(&weights, row, prior, scale, &mut variances);
+                emit(&mut slab, &targets, &variances);
             }
         }
     });
@@ -89,13 +89,14 @@ fn phi_coordinates(symmetry: Symmetry) -> Vec<f64> {
     (0..rows).map(|i| cell_center(0, 0, i).phi_d).collect()
 }
 
-/// The columns, each with its two rows `(row of the contracted weights, i_phi_d)`.
-fn column_rows(symmetry: Symmetry) -> impl Iterator<Item = (usize, [(usize, usize); 2])> {
-    (0..N_COLUMNS).map(move |j| {
-        let mirrored = N_PHI_D - 1 - j;
-        let source = if symmetry == Symmetry::Bilateral { j } else { mirrored };
-        (j, [(j, j), (source, mirrored)])
-    })
+/// Rows of the contracted weights that share the kernel values of column `j`, each with the `i_phi_d` it is for: one
+/// row for both halves of `phi_d` where the process is bilateral.
+fn mirrored_rows(symmetry: Symmetry, j: usize) -> Vec<(usize, Vec<usize>)> {
+    let mirror = N_PHI_D - 1 - j;
+    match symmetry {
+        Symmetry::Bilateral => vec![(j, vec![j, mirror])],
+        Symmetry::Reciprocal => vec![(j, vec![j]), (mirror, vec![mirror])],
+    }
 }
 
 /// `(B C) x 90` out of `A x B x C`.

@@ -36,19 +36,20 @@ impl SigmaTable {
 /// A lattice model takes tens of milliseconds; a dense one sums `n` kernel values a cell.
 #[must_use]
 pub fn bake_mean(model: &Model) -> BrdfTable {
-    let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space) else {
+    let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space)
+    else {
         return dense::bake_mean(model);
     };
     let mut mean = vec![[0.0f32; 3]; N_CELLS];
     let mut first = 0;
     for gp in groups {
         let slabs = mean.par_chunks_mut(SLAB);
-        lattice::bake_means(gp, model.space, symmetry, slabs, |slab, row, means| {
+        lattice::bake_means(gp, model.space, symmetry, slabs, |slab, rows, means| {
             for (channel, means) in means.chunks_mut(N_THETA_D).enumerate() {
                 means.iter_mut().for_each(|m| *m += model.offsets[first + channel]);
                 model.transform.inverse_in_place(means);
-                for (l, &value) in means.iter().enumerate() {
-                    slab[cell_index(0, l, row)][first + channel] = to_f32(value);
+                for (l, value) in means.iter().map(|&value| to_f32(value)).enumerate() {
+                    rows.iter().for_each(|&row| slab[cell_index(0, l, row)][first + channel] = value);
                 }
             }
         });
@@ -63,15 +64,16 @@ pub fn bake_mean(model: &Model) -> BrdfTable {
 /// interpolated between.
 #[must_use]
 pub fn bake_sigma(model: &Model) -> SigmaTable {
-    let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space) else {
+    let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space)
+    else {
         return dense::bake_sigma(model);
     };
     let planes = groups.iter().map(|gp| {
         let mut plane = vec![0.0f32; N_CELLS];
         let slabs = plane.par_chunks_mut(SLAB);
-        lattice::bake_variances(gp, model.space, symmetry, slabs, |slab, row, variances| {
-            for (l, &variance) in variances.iter().enumerate() {
-                slab[cell_index(0, l, row)] = to_f32(variance.sqrt());
+        lattice::bake_variances(gp, model.space, symmetry, slabs, |slab, rows, variances| {
+            for (l, sigma) in variances.iter().map(|&variance| to_f32(variance.sqrt())).enumerate() {
+                rows.iter().for_each(|&row| slab[cell_index(0, l, row)] = sigma);
             }
         });
         plane
@@ -86,4 +88,91 @@ const SLAB: usize = N_THETA_D * N_PHI_D;
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the table's precision")]
 fn to_f32(x: f64) -> f32 {
     x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{FitOptions, Layout, SampleSet, Solver, fit};
+    use crate::kernel::Shape;
+    use crate::layout::{LatticeLayout, Symmetry};
+    use crate::model::{IntervalOf, Provenance};
+    use crate::source::Source;
+    use crate::table::{cell_center, cell_indices};
+
+    fn model(symmetry: Symmetry, solver: Solver, per_channel: bool, kernel: Vec<Shape>) -> Model {
+        let source = Source::built_in("red-plastic").unwrap();
+        let layout = LatticeLayout { shape: [10, 8, 6], symmetry, ..LatticeLayout::default() };
+        let samples = SampleSet::measure(source.brdf().unwrap(), &Layout::Lattice(layout)).unwrap();
+        let options = FitOptions { solver, per_channel, kernel, ..FitOptions::default() };
+        fit(&samples, &options, Provenance::default()).unwrap().0
+    }
+
+    /// Cells of every region, below the horizon too.
+    fn cells() -> impl Iterator<Item = usize> {
+        (0..N_CELLS).step_by(1237)
+    }
+
+    fn center(cell: usize) -> crate::HalfDiff {
+        let (h, d, p) = cell_indices(cell);
+        cell_center(h, d, p)
+    }
+
+    #[test]
+    fn tables_hold_what_the_model_predicts() {
+        let sum = vec![Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }];
+        for model in [
+            model(Symmetry::Bilateral, Solver::Lattice, false, vec![Shape::Matern52]),
+            model(Symmetry::Reciprocal, Solver::Lattice, true, vec![Shape::SquaredExponential]),
+            model(Symmetry::Reciprocal, Solver::Lattice, false, sum),
+        ] {
+            let angles: Vec<_> = cells().map(center).collect();
+            let (mean, sigma) = (bake_mean(&model), bake_sigma(&model));
+            let (values, variances) =
+                (model.predict_mean(&angles), model.predict_variance(&angles, IntervalOf::Latent));
+            for ((cell, value), variance) in cells().zip(values).zip(variances) {
+                for c in 0..3 {
+                    let found = f64::from(mean.values()[cell][c]);
+                    assert!(
+                        (found - value[c]).abs() <= 2e-7 * value[c] + 1e-9,
+                        "{cell} {found} {}",
+                        value[c]
+                    );
+                    let (found, expected) = (f64::from(sigma.value(cell, c)), variance[c].sqrt());
+                    assert!((found - expected).abs() <= 1e-6 * expected + 1e-7, "{cell} {found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn dense_tables_hold_the_mean_and_interpolate_sigma() {
+        let model = model(Symmetry::Bilateral, Solver::Dense, false, vec![Shape::Matern52]);
+        let (mean, sigma) = (bake_mean(&model), bake_sigma(&model));
+        let angles: Vec<_> = cells().map(center).collect();
+        let (values, variances) =
+            (model.predict_mean(&angles), model.predict_variance(&angles, IntervalOf::Latent));
+        let mut ratios = Vec::new();
+        for ((cell, value), variance) in cells().zip(values).zip(variances) {
+            for c in 0..3 {
+                let found = f64::from(mean.values()[cell][c]);
+                assert!((found - value[c]).abs() <= 2e-7 * value[c] + 1e-9, "{cell} {found} {}", value[c]);
+            }
+            ratios.push((f64::from(sigma.value(cell, 0)) / variance[0].sqrt()).ln().abs());
+        }
+        ratios.sort_by(f64::total_cmp);
+        assert!(ratios[ratios.len() / 2] < 0.02, "{}", ratios[ratios.len() / 2]);
+    }
+
+    #[test]
+    fn tables_do_not_depend_on_the_number_of_threads() {
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let model = model(Symmetry::Bilateral, Solver::Lattice, false, vec![Shape::Matern52]);
+                (bake_mean(&model), bake_sigma(&model))
+            })
+        };
+        assert_eq!(run(1), run(3));
+    }
 }
