@@ -105,6 +105,15 @@ pub(crate) fn add_scaled(a: f64, x: &[f64], out: &mut [f64]) {
     });
 }
 
+/// `x_i = a x_i`.
+pub(crate) fn scale_in_place(a: f64, x: &mut [f64]) {
+    vectorized(|| {
+        for x in x.iter_mut() {
+            *x *= a;
+        }
+    });
+}
+
 /// `out_i = a x_i`.
 pub(crate) fn scale_into(a: f64, x: &[f64], out: &mut [f64]) {
     vectorized(|| {

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::angles::theta_d_max;
 use crate::gp::lattice::{LatticeGp, square};
 use crate::layout::Symmetry;
-use crate::simd::{add_scaled, vectorized};
+use crate::simd::vectorized;
 use crate::space::InputSpace;
 use crate::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 
@@ -41,9 +41,7 @@ pub(super) fn bake_means<S: Send>(
         for j in 0..N_COLUMNS {
             column.fill(gp, i, j);
             for (row, targets) in mirrored_rows(symmetry, j) {
-                for (weights, means) in weights.iter().zip(means.chunks_mut(N_THETA_D)) {
-                    column.sum_means(weights, row, means);
-                }
+                column.sum_means(&weights, row, &mut means);
                 emit(&mut slab, &targets, &mut means);
             }
         }
@@ -140,13 +138,17 @@ impl Column {
             }
             self.v.push(theta_d / limit);
         }
-        let (nodes, metric) = (&gp.data().coordinates[1], gp.data().metrics[1]);
+        let nodes = &gp.data().coordinates[1];
         self.kernels.resize(nodes.len() * self.v.len(), 0.0);
-        for (out, &node) in self.kernels.chunks_mut(self.v.len()).zip(nodes) {
-            for (out, &v) in out.iter_mut().zip(&self.v) {
-                *out = metric.distance(v, node);
+        let (kernels, v) = (&mut self.kernels, &self.v);
+        // The metric along v is the plain distance in every space.
+        vectorized(|| {
+            for (out, &node) in kernels.chunks_exact_mut(v.len()).zip(nodes) {
+                for (out, &v) in out.iter_mut().zip(v) {
+                    *out = (v - node) * (v - node);
+                }
             }
-        }
+        });
         gp.hyper().kernels[1].fill(&mut self.kernels);
     }
 
@@ -158,27 +160,36 @@ impl Column {
         matmul(out, Accum::Replace, kernels, vectors.as_ref(), 1.0, Par::Seq);
     }
 
-    fn sum_means(&self, weights: &Mat<f64>, row: usize, means: &mut [f64]) {
+    /// Means `[channel][cell]` of one row of the contracted weights of each channel.
+    fn sum_means(&self, weights: &[Mat<f64>], row: usize, means: &mut [f64]) {
         let count = self.v.len();
-        let (sums, below) = means.split_at_mut(count);
-        sums.fill(0.0);
-        for (kernels, &weight) in self.kernels.chunks(count).zip(weights.row(row).iter()) {
-            add_scaled(weight, kernels, sums);
-        }
-        below.fill(sums[count - 1]);
+        vectorized(|| {
+            for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
+                let (sums, below) = means.split_at_mut(count);
+                sums.fill(0.0);
+                for (node, kernels) in self.kernels.chunks_exact(count).enumerate() {
+                    let weight = weights[(row, node)];
+                    for (sum, kernel) in sums.iter_mut().zip(kernels) {
+                        *sum += weight * kernel;
+                    }
+                }
+                below.fill(sums[count - 1]);
+            }
+        });
     }
 
     fn sum_variances(&self, weights: &Mat<f64>, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);
-        sums.fill(prior);
-        for (projected, &weight) in self.projected.chunks(count).zip(weights.row(row).iter()) {
-            vectorized(|| {
+        vectorized(|| {
+            sums.fill(prior);
+            for (node, projected) in self.projected.chunks_exact(count).enumerate() {
+                let weight = weights[(row, node)];
                 for (sum, p) in sums.iter_mut().zip(projected) {
                     *sum -= weight * p * p;
                 }
-            });
-        }
+            }
+        });
         sums.iter_mut().for_each(|x| *x = (scale * *x).max(0.0));
         below.fill(sums[count - 1]);
     }

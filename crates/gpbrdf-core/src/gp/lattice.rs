@@ -356,7 +356,7 @@ impl LatticeGp {
             let column = column.as_mut().try_as_col_major_mut().map(|c| c.as_slice_mut());
             if let Some(column) = column {
                 for (out, &x) in column.iter_mut().zip(points) {
-                    *out = self.data.metrics[k].distance(x, node);
+                    *out = self.data.metrics[k].distance(x, node).powi(2);
                 }
                 self.hyper.kernels[k].fill(column);
             }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::shape::Shape;
 use crate::error::{Error, Result};
+use crate::simd::{add_scaled, scale_in_place};
 
 /// One summand of a [`Kernel1d`]: `weight shape(d / length_scale)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -131,27 +132,26 @@ impl Kernel1d {
         out
     }
 
-    /// Replaces distances by kernel values; in vector instructions for shapes of closed form.
-    pub(crate) fn fill(&self, distances: &mut [f64]) {
+    /// Replaces squared distances by kernel values; in vector instructions for shapes of closed form.
+    pub(crate) fn fill(&self, squared_distances: &mut [f64]) {
         let fill_term = |term: &Term1d, values: &mut [f64]| {
-            let scale = (term.length_scale * term.length_scale).recip();
-            values.iter_mut().for_each(|d| *d *= *d * scale);
+            scale_in_place((term.length_scale * term.length_scale).recip(), values);
             term.shape.fill(values);
             if term.weight != 1.0 {
-                values.iter_mut().for_each(|k| *k *= term.weight);
+                scale_in_place(term.weight, values);
             }
         };
         if let [term] = self.terms.as_slice() {
-            fill_term(term, distances);
+            fill_term(term, squared_distances);
             return;
         }
-        let input = distances.to_vec();
-        distances.fill(0.0);
+        let input = squared_distances.to_vec();
+        squared_distances.fill(0.0);
         let mut values = Vec::with_capacity(input.len());
         for term in &self.terms {
             values.clone_from(&input);
             fill_term(term, &mut values);
-            distances.iter_mut().zip(&values).for_each(|(sum, value)| *sum += value);
+            add_scaled(1.0, &values, squared_distances);
         }
     }
 
@@ -261,7 +261,7 @@ mod tests {
     fn filled_slices_agree_with_single_values() {
         for kernel in [sum_of_three(), Kernel1d::new(Shape::Matern52, 0.3)] {
             let distances: Vec<f64> = (0..600).map(|i| f64::from(i) * 0.004).collect();
-            let mut row = distances.clone();
+            let mut row: Vec<f64> = distances.iter().map(|d| d * d).collect();
             kernel.fill(&mut row);
             for (d, k) in distances.iter().zip(&row) {
                 assert!((k - kernel.value(*d)).abs() < 1e-14, "{kernel:?} {d}");
