@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use crate::angles::theta_d_max;
 use crate::gp::lattice::{LatticeGp, square};
+use crate::kernel::GridScratch;
 use crate::layout::Symmetry;
 use crate::simd::vectorized;
 use crate::space::InputSpace;
@@ -122,6 +123,7 @@ struct Column {
     kernels: Vec<f64>,
     /// `kernels` in the eigenbasis of `v`.
     projected: Vec<f64>,
+    scratch: GridScratch,
 }
 
 impl Column {
@@ -140,16 +142,8 @@ impl Column {
         }
         let nodes = &gp.data().coordinates[1];
         self.kernels.resize(nodes.len() * self.v.len(), 0.0);
-        let (kernels, v) = (&mut self.kernels, &self.v);
         // The metric along v is the plain distance in every space.
-        vectorized(|| {
-            for (out, &node) in kernels.chunks_exact_mut(v.len()).zip(nodes) {
-                for (out, &v) in out.iter_mut().zip(v) {
-                    *out = (v - node) * (v - node);
-                }
-            }
-        });
-        gp.hyper().kernels[1].fill(&mut self.kernels);
+        gp.hyper().kernels[1].fill_grid(&self.v, nodes, &mut self.scratch, &mut self.kernels);
     }
 
     fn project(&mut self, vectors: &Mat<f64>) {
@@ -163,34 +157,43 @@ impl Column {
     /// Means `[channel][cell]` of one row of the contracted weights of each channel.
     fn sum_means(&self, weights: &[Mat<f64>], row: usize, means: &mut [f64]) {
         let count = self.v.len();
-        vectorized(|| {
-            for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
-                let (sums, below) = means.split_at_mut(count);
-                sums.fill(0.0);
-                for (node, kernels) in self.kernels.chunks_exact(count).enumerate() {
-                    let weight = weights[(row, node)];
-                    for (sum, kernel) in sums.iter_mut().zip(kernels) {
-                        *sum += weight * kernel;
-                    }
-                }
-                below.fill(sums[count - 1]);
-            }
-        });
+        for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
+            let (sums, below) = means.split_at_mut(count);
+            let weights: Vec<f64> = weights.row(row).iter().copied().collect();
+            vectorized(|| weighted_sum(&weights, &self.kernels, sums));
+            below.fill(sums[count - 1]);
+        }
     }
 
+    /// Latent variances `[cell]` of one row of the contracted precisions.
     fn sum_variances(&self, weights: &Mat<f64>, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);
-        vectorized(|| {
-            sums.fill(prior);
-            for (node, projected) in self.projected.chunks_exact(count).enumerate() {
-                let weight = weights[(row, node)];
-                for (sum, p) in sums.iter_mut().zip(projected) {
-                    *sum -= weight * p * p;
-                }
-            }
-        });
-        sums.iter_mut().for_each(|x| *x = (scale * *x).max(0.0));
+        let weights: Vec<f64> = weights.row(row).iter().copied().collect();
+        vectorized(|| weighted_sum_of_squares(&weights, &self.projected, sums));
+        sums.iter_mut().for_each(|x| *x = (scale * (prior - *x)).max(0.0));
         below.fill(sums[count - 1]);
+    }
+}
+
+/// `sums[i] = sum_j weights[j] values[j][i]`.
+#[inline(always)]
+fn weighted_sum(weights: &[f64], values: &[f64], sums: &mut [f64]) {
+    sums.fill(0.0);
+    for (values, weight) in values.chunks_exact(sums.len()).zip(weights) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += weight * value;
+        }
+    }
+}
+
+/// `sums[i] = sum_j weights[j] values[j][i]^2`.
+#[inline(always)]
+fn weighted_sum_of_squares(weights: &[f64], values: &[f64], sums: &mut [f64]) {
+    sums.fill(0.0);
+    for (values, weight) in values.chunks_exact(sums.len()).zip(weights) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += weight * (value * value);
+        }
     }
 }
