@@ -60,6 +60,9 @@ pub(crate) struct AxisEigen {
     pub(crate) values: Vec<f64>,
 }
 
+/// For each axis the derivatives of its covariance in the log-parameters of its kernel.
+type AxisSlopes = [Vec<Mat<f64>>; 3];
+
 impl AxisEigen {
     fn new(gram: &Mat<f64>) -> Result<Self> {
         let n = gram.nrows();
@@ -164,11 +167,7 @@ impl LatticeData {
     }
 
     /// Eigendecompositions of the three axes, and the derivatives of their covariances.
-    fn eigen(
-        &self,
-        kernels: &[Kernel1d; 3],
-        derivatives: bool,
-    ) -> Result<([AxisEigen; 3], [Vec<Mat<f64>>; 3])> {
+    fn eigen(&self, kernels: &[Kernel1d; 3], derivatives: bool) -> Result<([AxisEigen; 3], AxisSlopes)> {
         let axis = |k: usize| -> Result<_> {
             let (gram, slopes) = self.gram(k, &kernels[k], derivatives);
             Ok((AxisEigen::new(&gram)?, slopes))
@@ -212,7 +211,7 @@ impl LatticeData {
 /// Targets and noise in the eigenbasis.
 struct Spectrum {
     eigen: [AxisEigen; 3],
-    slopes: [Vec<Mat<f64>>; 3],
+    slopes: AxisSlopes,
     ratio: f64,
     /// Targets in the eigenbasis.
     z: Vec<f64>,
