@@ -67,13 +67,20 @@ impl LatticeLayout {
         self.len() == 0
     }
 
+    /// A lattice of this shape. With few nodes along `u` they spread less: `node_spread = 1 + A / 32`, at most 3.
+    #[must_use]
+    pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
+        let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
+        Self { shape, node_spread, symmetry, ..Self::default() }
+    }
+
     /// A lattice with the proportions of the default one and about `samples` nodes.
     ///
     /// # Errors
-    /// Fewer than 8 samples.
+    /// Fewer than 12 samples.
     pub fn with_samples(samples: usize, symmetry: Symmetry) -> Result<Self> {
-        if samples < 8 {
-            return Err(Error::argument("number of samples", "at least 8", samples));
+        if samples < 12 {
+            return Err(Error::argument("number of samples", "at least 12", samples));
         }
         let reference = Self::default().shape.map(|n| n as f64);
         // The circle is twice as long as the folded interval.
@@ -93,7 +100,7 @@ impl LatticeLayout {
                 best = (shape, miss);
             }
         }
-        Ok(Self { shape: best.0, symmetry, ..Self::default() })
+        Ok(Self::with_shape(best.0, symmetry))
     }
 
     /// Checks every field.
@@ -230,7 +237,7 @@ mod tests {
             LatticeLayout::with_samples(36_864, Symmetry::Bilateral).unwrap(),
             LatticeLayout::default()
         );
-        for samples in [8, 64, 225, 3072, 37_616, 200_000] {
+        for samples in [12, 64, 225, 3072, 37_616, 200_000] {
             for symmetry in [Symmetry::Bilateral, Symmetry::Reciprocal] {
                 let layout = LatticeLayout::with_samples(samples, symmetry).unwrap();
                 layout.validate().unwrap();
@@ -238,7 +245,7 @@ mod tests {
                 assert!((0.75..1.35).contains(&ratio), "{samples} {layout:?}");
             }
         }
-        assert!(LatticeLayout::with_samples(7, Symmetry::Bilateral).is_err());
+        assert!(LatticeLayout::with_samples(11, Symmetry::Bilateral).is_err());
     }
 
     #[test]

@@ -143,7 +143,7 @@ impl ModelArgs {
                 };
                 terminal.detail(&format!("symmetry: {symmetry:?}"));
                 let mut lattice = match self.lattice {
-                    Some(shape) => LatticeLayout { shape, symmetry, ..LatticeLayout::default() },
+                    Some(shape) => LatticeLayout::with_shape(shape, symmetry),
                     None => LatticeLayout::with_samples(self.samples.unwrap_or(PAPER_SAMPLES), symmetry)?,
                 };
                 if let Some(density) = self.node_density {

@@ -554,6 +554,7 @@ mod tests {
         LatticeData {
             coordinates,
             metrics: [AxisMetric::Linear, AxisMetric::Linear, metric],
+            mirrored: [false, false, mirrored],
             targets,
             channels,
         }
