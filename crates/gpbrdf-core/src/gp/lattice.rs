@@ -626,6 +626,35 @@ mod tests {
     }
 
     #[test]
+    fn agrees_with_the_dense_solver() {
+        for axis in &AXES[..2] {
+            let data = data(*axis);
+            let n = data.len();
+            let x = points(&data);
+            for hyper in cases() {
+                let axes = hyper.kernels.iter().cloned().zip(data.metrics).collect();
+                let kernel = crate::kernel::Kernel::product(hyper.signal_variance, axes);
+                let y: Vec<f64> = (0..n).flat_map(|i| [data.targets[i], data.targets[n + i]]).collect();
+                let noise = hyper.noise_variance;
+                let dense = crate::gp::DenseGp::fit_at(x.as_flattened(), &y, 2, kernel, noise).unwrap();
+                let lattice = LatticeGp::new(data.clone(), hyper.clone()).unwrap();
+                let queries: Vec<[f64; 3]> =
+                    (0..30).map(|i| [0.03 * f64::from(i), 0.5, 0.08 * f64::from(i)]).collect();
+                let means = dense.predict_mean(queries.as_flattened()).unwrap();
+                for (a, b) in lattice.predict_mean(&queries).iter().zip(&means) {
+                    assert!((a - b).abs() < 1e-8 * b.abs().max(1e-3), "{a} {b}");
+                }
+                let variances = dense.predict_variance_latent(queries.as_flattened()).unwrap();
+                for (a, b) in lattice.predict_variance_latent(&queries).iter().zip(&variances) {
+                    assert!((a / b - 1.0).abs() < 1e-8, "{a} {b}");
+                }
+                let (a, b) = (data.likelihood(&hyper).unwrap().value, dense.log_marginal_likelihood());
+                assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+            }
+        }
+    }
+
+    #[test]
     fn gradients_agree_with_finite_differences() {
         for axis in AXES {
             let data = data(axis);
