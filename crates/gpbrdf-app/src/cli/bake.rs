@@ -17,7 +17,7 @@ use super::report::{Report, Seconds};
 use super::terminal::Terminal;
 
 /// Pixels along each side of the pictured spheres.
-const PICTURE_SIZE: usize = 224;
+const PICTURE_SIZE: usize = 160;
 
 #[derive(Args, Debug)]
 pub(crate) struct Bake {
