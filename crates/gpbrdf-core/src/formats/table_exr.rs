@@ -225,11 +225,19 @@ fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
     let mut values = vec![[0.0f32; 3]; N_CELLS];
     let mut filled = 0;
     let chunks = reader
-        .filter_chunks(true, |_, _, block| block.layer == layer && block.level == Vec2(0, 0))
+        .filter_chunks(true, |meta, _, block| {
+            let wanted = block.layer == layer && block.level == Vec2(0, 0);
+            // The last rows of the other parts show that the file is whole.
+            let end = block.pixel_position.y() + block.pixel_size.y();
+            wanted || end >= meta.headers[block.layer].layer_size.y()
+        })
         .map_err(damaged)?;
     let meta = chunks.meta_data().clone();
     for chunk in chunks {
         let chunk: Chunk = chunk.map_err(damaged)?;
+        if chunk.layer_index != layer {
+            continue;
+        }
         let block = UncompressedBlock::decompress_chunk(chunk, &meta, true).map_err(damaged)?;
         if block.index.layer != layer || block.index.level != Vec2(0, 0) {
             return Err(wrong("blocks where the offset table says", "others".to_owned()));
