@@ -219,7 +219,11 @@ fn damaged_samples() {
 fn damaged_rgl_files() {
     let cli = Cli::new();
     cli.write("r.bsdf", b"tensor_file\0\x01\0");
-    refused(&cli, "r.bsdf", "RGL file \"r.bsdf\": expected a whole header, found 14 bytes that end within it");
+    refused(
+        &cli,
+        "r.bsdf",
+        "RGL file \"r.bsdf\": expected a whole header, found 14 bytes that end within it",
+    );
     let Some(data) = data_dir() else { return };
     let good = std::fs::read(data.join("rgl/paper_blue_rgb.bsdf")).unwrap();
     for length in [40, 5000, good.len() / 2, good.len() - 1] {

@@ -85,7 +85,10 @@ fn values_out_of_range_are_refused() {
             &["--layout", "random", "--solver", "lattice"],
             "--solver lattice: expected --layout lattice, found another layout",
         ),
-        (&["--lattice", "4x4x4", "--env", "absent.hdr"], "cannot read \"absent.hdr\": No such file or directory (os error 2)"),
+        (
+            &["--lattice", "4x4x4", "--env", "absent.hdr"],
+            "cannot read \"absent.hdr\": No such file or directory (os error 2)",
+        ),
         (
             &["--lattice", "4x4x4", "-o", "one.csv"],
             "cannot create folder \"one.csv\": expected a folder, found the file \"one.csv\"",
@@ -110,7 +113,10 @@ fn names_of_outputs_choose_their_format() {
     cli.write("s.csv", "theta_i,phi_i,theta_o,phi_o,f\n10,0,20,0,1\n");
     std::fs::create_dir(cli.path("folder.csv")).unwrap();
     for (arguments, message) in [
-        (&["convert", "lambert", "t.ply"][..], "\"t.ply\": expected a name that ends in .binary, .exr or .csv"),
+        (
+            &["convert", "lambert", "t.ply"][..],
+            "\"t.ply\": expected a name that ends in .binary, .exr or .csv",
+        ),
         (&["slice", "lambert", "-o", "t.jpg"], "\"t.jpg\": expected a name that ends in .png or .exr"),
         (&["slice", "lambert", "--phi-d", "nan"], "--phi-d: expected a finite number, found NaN"),
         (

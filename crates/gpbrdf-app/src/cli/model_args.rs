@@ -36,7 +36,7 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_enum, default_value = "auto")]
     symmetry: SymmetryName,
     /// Exponent that crowds the lattice's nodes at the specular peak; 1 is even in sqrt(theta_h).
-    #[arg(long, value_name = "EXPONENT", allow_negative_numbers = true)]
+    #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
     node_density: Option<f64>,
     /// Exact solver.
     #[arg(long, value_enum, default_value = "auto")]
@@ -45,19 +45,19 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value = "matern52")]
     kernel: String,
     /// Smoothness of `--kernel matern`.
-    #[arg(long, value_name = "NU", default_value_t = 1.5, allow_negative_numbers = true)]
+    #[arg(long, value_name = "NU", default_value_t = 1.5, allow_hyphen_values = true)]
     nu: f64,
     /// What is fitted: ln(f + epsilon), f itself or its cube root.
     #[arg(long, value_enum, default_value = "log")]
     transform: TransformName,
     /// Epsilon of `--transform log`, sr^-1.
-    #[arg(long, value_name = "VALUE", default_value_t = 1e-3, allow_negative_numbers = true)]
+    #[arg(long, value_name = "VALUE", default_value_t = 1e-3, allow_hyphen_values = true)]
     epsilon: f64,
     /// Prior mean.
     #[arg(long, value_enum, default_value = "constant")]
     mean: MeanName,
     /// Noise variance in squared target units, or auto to find it.
-    #[arg(long, value_name = "VARIANCE|auto", default_value = "auto", value_parser = parse_noise, allow_negative_numbers = true)]
+    #[arg(long, value_name = "VARIANCE|auto", default_value = "auto", value_parser = parse_noise, allow_hyphen_values = true)]
     noise: NoiseArg,
     /// Seed of random layouts and restarts.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
@@ -163,7 +163,10 @@ impl ModelArgs {
                 lattice.validate()?;
                 if lattice.len() > MAX_NODES {
                     let [a, b, c] = lattice.shape;
-                    bail!("--lattice: expected at most {MAX_NODES} nodes, found {a}x{b}x{c} = {}", lattice.len());
+                    bail!(
+                        "--lattice: expected at most {MAX_NODES} nodes, found {a}x{b}x{c} = {}",
+                        lattice.len()
+                    );
                 }
                 if matches!(self.solver, SolverName::Dense) {
                     self.foretell(lattice.len(), terminal)?;

@@ -17,10 +17,10 @@ pub(crate) struct SliceCommand {
     #[arg(short, long, value_name = "FILE", default_value = "slice.png")]
     output: PathBuf,
     /// phi_d in degrees; at 90 every direction is above the horizon.
-    #[arg(long, value_name = "DEGREES", default_value_t = 90.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 90.0, allow_hyphen_values = true)]
     phi_d: f64,
     /// Exposure in stops.
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     exposure: f64,
     /// Show theta_h by its square root, as the table stores it.
     #[arg(long)]
