@@ -25,6 +25,26 @@ fn both_solvers_learn_the_same_material() {
 }
 
 #[test]
+fn channels_may_have_their_own_hyper_parameters() {
+    let cli = Cli::new();
+    for solver in ["dense", "lattice"] {
+        let arguments =
+            ["--solver", solver, "--lattice", "6x5x4", "--per-channel", "--json", "-o", "m.safetensors"];
+        let report = cli.json(&[&["fit", "cook-torrance"], &arguments[..]].concat());
+        let channels = report["hyperparameters"]["channels"].as_array().unwrap();
+        assert_eq!(channels.len(), 3, "{solver}: {report:#}");
+        for channel in channels {
+            assert_eq!(channel["length_scale"].as_array().unwrap().len(), 3);
+            assert!(channel["noise_variance"].as_f64().unwrap() > 0.0, "{channel}");
+        }
+        assert_eq!(
+            cli.json(&["info", "m.safetensors", "--json"])["details"]["hyperparameters"]["channels"],
+            *channels
+        );
+    }
+}
+
+#[test]
 fn scattered_layouts_are_seeded() {
     let cli = Cli::new();
     let fit = |layout: &str, seed: &str, name: &str| {

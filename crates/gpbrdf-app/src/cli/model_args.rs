@@ -21,6 +21,9 @@ const MAX_NODES: usize = 1 << 22;
 /// Evaluations of likelihood and gradient that a dense search usually takes.
 const TYPICAL_EVALUATIONS: usize = 40;
 
+/// Fewer samples than this take a second and a few MB: nothing to foretell.
+const SHORT_DENSE_RUN: usize = 1000;
+
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ModelArgs {
     /// Nodes of the lattice along theta_h, theta_d and phi_d, for example 48x32x24.
@@ -195,6 +198,9 @@ impl ModelArgs {
     /// Tells what a dense fit to `samples` samples will take if that is long, and refuses it if it will not fit in
     /// memory; before anything is sampled.
     fn foretell(&self, samples: usize, terminal: &Terminal) -> Result<()> {
+        if samples < SHORT_DENSE_RUN {
+            return Ok(());
+        }
         let mut cost = dense_cost(samples, 3, TYPICAL_EVALUATIONS);
         if self.per_channel {
             cost.seconds *= 3.0;
