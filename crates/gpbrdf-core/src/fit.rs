@@ -150,10 +150,7 @@ impl Default for FitOptions {
             mean: MeanFunction::default(),
             noise: Noise::default(),
             per_channel: false,
-            space: InputSpace::WarpedBox {
-                density: LatticeLayout::default().node_density,
-                symmetry: Symmetry::Bilateral,
-            },
+            space: LatticeLayout::default().space(),
             optimize: OptimizeOptions::default(),
         }
     }
@@ -194,14 +191,19 @@ pub fn fit(
 
     let (space, process, reports) = match (options.solver, &samples.lattice) {
         (Solver::Auto | Solver::Lattice, Some(lattice)) => {
-            let space = InputSpace::WarpedBox { density: lattice.node_density, symmetry: lattice.symmetry };
+            let space = lattice.space();
             let [u, v, phi] = lattice.nodes();
-            let coordinates = [u.into_iter().map(|u| space.warp_u(u)).collect(), v, phi];
+            let coordinates = [
+                u.into_iter().map(|u| space.warp_u(u)).collect(),
+                v.into_iter().map(|v| space.warp_v(v)).collect(),
+                phi,
+            ];
             let kernels = coordinates.each_ref().map(|x: &Vec<f64>| starting_kernel(&options.kernel, x));
             let fitted = groups.into_iter().map(|targets| {
                 let data = LatticeData {
                     coordinates: coordinates.clone(),
-                    metrics: space.metrics(),
+                    metrics: space.lattice_metrics(),
+                    mirrored: space.mirrored(),
                     channels: targets.len(),
                     targets: targets.concat(),
                 };
@@ -214,10 +216,7 @@ pub fn fit(
             return Err(Error::argument("solver", "dense, for samples off a lattice", "lattice"));
         }
         (Solver::Auto | Solver::Dense, lattice) => {
-            let space = lattice.as_ref().map_or(options.space, |lattice| InputSpace::WarpedBox {
-                density: lattice.node_density,
-                symmetry: lattice.symmetry,
-            });
+            let space = lattice.as_ref().map_or(options.space, LatticeLayout::space);
             space.validate()?;
             let points: Vec<[f64; 3]> = samples.angles.iter().map(|&a| space.coordinates(a)).collect();
             let fitted = groups.into_iter().map(|targets| {

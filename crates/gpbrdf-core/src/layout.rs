@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::angles::{BoxPoint, HalfDiff};
 use crate::error::{Error, Result};
 use crate::gp::optimize::SplitMix64;
-use crate::table::{N_CELLS, cell_center, cell_indices};
+use crate::space::InputSpace;
+use crate::table::{N_CELLS, N_THETA_H, cell_center, cell_indices};
 
 /// The symmetry of `f` in `phi_d` that a layout and a model rely on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,9 +26,14 @@ pub enum Symmetry {
 pub struct LatticeLayout {
     /// Nodes along `u`, `v`, `phi`.
     pub shape: [usize; 3],
-    /// Exponent of the nodes along `u`: `u = t^node_density` with `t` evenly spaced; above 1 the nodes crowd
-    /// at the specular peak.
+    /// Exponent of the warp along `u`, in which kernels measure distance: `u^(1/node_density)`.
     pub node_density: f64,
+    /// Exponent `p > 1` of the nodes along `u`: `u = s t + (1 - s) t^p` with `t` evenly spaced and `s = A / 90`, so
+    /// that at the specular peak the nodes stand on the centres of the table's cells, no denser, and spread out
+    /// from there. 0 for `u = t^node_density`, nodes that are even in the warp.
+    pub node_spread: f64,
+    /// Exponent of the nodes along `v`: `v = v_max t^v_density`; below 1 the nodes crowd towards the horizon.
+    pub v_density: f64,
     /// The largest `v`; 1 is the horizon, where nothing can be measured.
     pub v_max: f64,
     /// Symmetry in `phi_d`.
@@ -35,9 +41,16 @@ pub struct LatticeLayout {
 }
 
 impl Default for LatticeLayout {
-    /// 48 x 32 x 24 nodes: 36,864 samples, 2.5 % of the table.
+    /// 64 x 32 x 18 nodes: 36,864 samples, 2.5 % of the table.
     fn default() -> Self {
-        Self { shape: [48, 32, 24], node_density: 1.3, v_max: 0.97, symmetry: Symmetry::Bilateral }
+        Self {
+            shape: [64, 32, 18],
+            node_density: 1.3,
+            node_spread: 3.0,
+            v_density: 0.65,
+            v_max: 0.97,
+            symmetry: Symmetry::Bilateral,
+        }
     }
 }
 
@@ -54,13 +67,20 @@ impl LatticeLayout {
         self.len() == 0
     }
 
+    /// A lattice of this shape. With few nodes along `u` they spread less: `node_spread = 1 + A / 32`, at most 3.
+    #[must_use]
+    pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
+        let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
+        Self { shape, node_spread, symmetry, ..Self::default() }
+    }
+
     /// A lattice with the proportions of the default one and about `samples` nodes.
     ///
     /// # Errors
-    /// Fewer than 8 samples.
+    /// Fewer than 12 samples.
     pub fn with_samples(samples: usize, symmetry: Symmetry) -> Result<Self> {
-        if samples < 8 {
-            return Err(Error::argument("number of samples", "at least 8", samples));
+        if samples < 12 {
+            return Err(Error::argument("number of samples", "at least 12", samples));
         }
         let reference = Self::default().shape.map(|n| n as f64);
         // The circle is twice as long as the folded interval.
@@ -80,7 +100,7 @@ impl LatticeLayout {
                 best = (shape, miss);
             }
         }
-        Ok(Self { shape: best.0, symmetry, ..Self::default() })
+        Ok(Self::with_shape(best.0, symmetry))
     }
 
     /// Checks every field.
@@ -99,22 +119,46 @@ impl LatticeLayout {
         if !(self.node_density >= 0.25 && self.node_density <= 4.0) {
             return Err(Error::argument("node density", "0.25 to 4", self.node_density));
         }
+        if !(self.node_spread == 0.0 || (self.node_spread >= 1.0 && self.node_spread <= 8.0)) {
+            return Err(Error::argument("node spread", "0, or 1 to 8", self.node_spread));
+        }
+        if !(self.v_density >= 0.25 && self.v_density <= 4.0) {
+            return Err(Error::argument("node density along v", "0.25 to 4", self.v_density));
+        }
         if !(self.v_max > 0.1 && self.v_max <= 1.0) {
             return Err(Error::argument("v_max", "0.1 to 1", self.v_max));
         }
         Ok(())
     }
 
+    /// The input space of a process on this lattice.
+    #[must_use]
+    pub fn space(&self) -> InputSpace {
+        InputSpace::WarpedBox {
+            density: self.node_density,
+            v_density: self.v_density,
+            symmetry: self.symmetry,
+        }
+    }
+
     /// The nodes along `u`, `v` and `phi`, increasing.
     #[must_use]
     pub fn nodes(&self) -> [Vec<f64>; 3] {
         let [a, b, c] = self.shape.map(|n| n as f64);
-        let u = (0..self.shape[0]).map(|i| ((i as f64 + 0.5) / a).powf(self.node_density)).collect();
-        let v = (0..self.shape[1]).map(|i| i as f64 / (b - 1.0) * self.v_max).collect();
-        let phi = match self.symmetry {
-            Symmetry::Bilateral => (0..self.shape[2]).map(|i| i as f64 / (c - 1.0) * FRAC_PI_2).collect(),
-            Symmetry::Reciprocal => (0..self.shape[2]).map(|i| (i as f64 + 0.5) / c * PI).collect(),
+        let spread = |t: f64| {
+            let s = (a / N_THETA_H as f64).min(1.0);
+            s * t + (1.0 - s) * t.powf(self.node_spread)
         };
+        let place = |t: f64| if self.node_spread > 0.0 { spread(t) } else { t.powf(self.node_density) };
+        let u = (0..self.shape[0]).map(|i| place((i as f64 + 0.5) / a)).collect();
+        let v =
+            (0..self.shape[1]).map(|i| (i as f64 / (b - 1.0)).powf(self.v_density) * self.v_max).collect();
+        // Half a step off the ends of a folded phi, where the mirrored kernel already knows that slopes vanish.
+        let period = match self.symmetry {
+            Symmetry::Bilateral => FRAC_PI_2,
+            Symmetry::Reciprocal => PI,
+        };
+        let phi = (0..self.shape[2]).map(|i| (i as f64 + 0.5) / c * period).collect();
         [u, v, phi]
     }
 
@@ -193,7 +237,7 @@ mod tests {
             LatticeLayout::with_samples(36_864, Symmetry::Bilateral).unwrap(),
             LatticeLayout::default()
         );
-        for samples in [8, 64, 225, 3072, 37_616, 200_000] {
+        for samples in [12, 64, 225, 3072, 37_616, 200_000] {
             for symmetry in [Symmetry::Bilateral, Symmetry::Reciprocal] {
                 let layout = LatticeLayout::with_samples(samples, symmetry).unwrap();
                 layout.validate().unwrap();
@@ -201,7 +245,7 @@ mod tests {
                 assert!((0.75..1.35).contains(&ratio), "{samples} {layout:?}");
             }
         }
-        assert!(LatticeLayout::with_samples(7, Symmetry::Bilateral).is_err());
+        assert!(LatticeLayout::with_samples(11, Symmetry::Bilateral).is_err());
     }
 
     #[test]
@@ -209,6 +253,7 @@ mod tests {
         let good = LatticeLayout::default();
         assert!(LatticeLayout { shape: [1, 4, 4], ..good.clone() }.validate().is_err());
         assert!(LatticeLayout { node_density: f64::NAN, ..good.clone() }.validate().is_err());
+        assert!(LatticeLayout { v_density: 0.0, ..good.clone() }.validate().is_err());
         assert!(LatticeLayout { v_max: 1.5, ..good }.validate().is_err());
     }
 

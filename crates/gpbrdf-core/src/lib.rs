@@ -1,4 +1,41 @@
-//! Gaussian-process BRDFs.
+//! Gaussian-process BRDFs: a complete, render-ready material out of few measurements, with an error bar.
+//!
+//! From a file, or a built-in material, to a table of mean and sigma:
+//!
+//! ```
+//! use gpbrdf_core::{
+//!     FitOptions, LatticeLayout, Layout, Provenance, SampleSet, Source, Symmetry, bake_mean, bake_sigma, fit,
+//! };
+//!
+//! # fn main() -> gpbrdf_core::Result<()> {
+//! let source = Source::built_in("cherry-235")?; // or Source::open(path)
+//! let brdf = source.brdf().expect("an analytic model can be asked anywhere");
+//! let layout = LatticeLayout::with_samples(500, Symmetry::Bilateral)?;
+//! let samples = SampleSet::measure(brdf, &Layout::Lattice(layout))?;
+//! let (model, report) = fit(&samples, &FitOptions::default(), Provenance::default())?;
+//! let mean = bake_mean(&model); // 90 x 90 x 180 cells of RGB in 1/sr
+//! let sigma = bake_sigma(&model); // and how sure it is
+//! # assert!(report[0].converged && mean.cell(0, 0, 0)[0] > 0.0 && sigma.value(0, 0) > 0.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Where things are
+//!
+//! - **Conventions**: local frame with the normal `+z`, `wi` to the light, `wo` to the viewer, both unit; `f` in sr^-1
+//!   without the cosine; half-difference angles in radians ([`HalfDiff`]). f64 throughout, f32 in tables.
+//! - **Sources**: [`Source`] opens every kind of file that is read and the built-in [`materials`]; anything that
+//!   implements [`Brdf`] can be sampled.
+//! - **Samples**: [`Layout`] says where to measure, [`SampleSet`] holds what was measured.
+//! - **Fitting**: [`fit`] finds hyper-parameters by maximum marginal likelihood and conditions an exact process: on a
+//!   product lattice in milliseconds ([`LatticeGp`]), on any points in `O(n^3)` ([`DenseGp`]).
+//! - **Models**: [`Model`] predicts means and intervals, is itself a [`Brdf`], and is saved and loaded bit for bit.
+//! - **Tables**: [`bake_mean`] and [`bake_sigma`] fill all 1,458,000 cells; [`write_merl`] and [`write_table_exr`] write
+//!   them.
+//! - **Judging**: [`Metrics`] against a truth, [`slice_figure`] and [`sphere_figure`] for people.
+//!
+//! Results do not depend on the number of threads. The paper is Hao, Liu and Weng, "A BRDF Representing Method Based on
+//! Gaussian Process"; equation numbers without another source are its.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests state exact expectations"))]
 
 mod analytic;

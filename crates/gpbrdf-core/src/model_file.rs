@@ -170,8 +170,8 @@ impl Model {
                     let coordinates = [u?, v?, phi?];
                     let nodes: usize = coordinates.iter().map(Vec::len).product();
                     let channels = targets.len() / nodes.max(1);
-                    let data =
-                        LatticeData { coordinates, metrics: header.space.metrics(), targets, channels };
+                    let (metrics, mirrored) = (header.space.lattice_metrics(), header.space.mirrored());
+                    let data = LatticeData { coordinates, metrics, mirrored, targets, channels };
                     LatticeGp::from_weights(data, hyper, read(format!("{g}.weights"))?).map_err(damaged)
                 });
                 Process::Lattice(groups.collect::<Result<_>>()?)

@@ -14,11 +14,13 @@ use crate::layout::Symmetry;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum InputSpace {
-    /// The warped box, stretched where nodes crowd: `(u^(1/density), min(v, 1), phi)`. Directions below the
+    /// The warped box, stretched where nodes crowd: `(u^(1/density), min(v, 1)^(1/v_density), phi)`. Directions below the
     /// horizon stand for the horizon.
     WarpedBox {
         /// Exponent of the warp along `u`.
         density: f64,
+        /// Exponent of the warp along `v`.
+        v_density: f64,
         /// Symmetry in `phi_d`; [`Symmetry::Bilateral`] folds `phi` to `[0, pi/2]`.
         symmetry: Symmetry,
     },
@@ -37,7 +39,7 @@ impl InputSpace {
                 if symmetry == Symmetry::Bilateral {
                     point = point.folded_bilateral();
                 }
-                [self.warp_u(point.u), point.v.min(1.0), point.phi]
+                [self.warp_u(point.u), self.warp_v(point.v), point.phi]
             }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
@@ -49,10 +51,11 @@ impl InputSpace {
     /// A density that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         match self {
-            Self::WarpedBox { density, .. } if !(density > 0.0 && density.is_finite()) => {
-                Err(Error::argument("node density", "a positive number", density))
+            Self::WarpedBox { density, v_density, .. } => {
+                let bad = [density, v_density].into_iter().find(|x| !(*x > 0.0 && x.is_finite()));
+                bad.map_or(Ok(()), |x| Err(Error::argument("node density", "a positive number", x)))
             }
-            _ => Ok(()),
+            Self::HalfDiff => Ok(()),
         }
     }
 
@@ -63,6 +66,29 @@ impl InputSpace {
             Self::WarpedBox { density, .. } => u.powf(1.0 / density),
             Self::HalfDiff => u * u * FRAC_PI_2,
         }
+    }
+
+    /// The second coordinate at `v`, in the warped box; above the horizon's 1 it stays there.
+    #[must_use]
+    pub fn warp_v(self, v: f64) -> f64 {
+        match self {
+            Self::WarpedBox { v_density, .. } => v.min(1.0).powf(1.0 / v_density),
+            Self::HalfDiff => v,
+        }
+    }
+
+    /// Whether functions of each coordinate are even, about 0 and with the period of a chord: on a folded `phi` they
+    /// are.
+    #[must_use]
+    pub fn mirrored(self) -> [bool; 3] {
+        [false, false, matches!(self, Self::WarpedBox { symmetry: Symmetry::Bilateral, .. })]
+    }
+
+    /// Metrics of a lattice: `phi` is always an angle of period `pi` there, and a folded one is
+    /// [`InputSpace::mirrored`] as well.
+    #[must_use]
+    pub fn lattice_metrics(self) -> [AxisMetric; 3] {
+        [AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord]
     }
 
     /// How distance is measured along each coordinate.
@@ -83,8 +109,8 @@ mod tests {
 
     #[test]
     fn warped_box_folds_and_stops_at_the_horizon() {
-        let folded = InputSpace::WarpedBox { density: 1.5, symmetry: Symmetry::Bilateral };
-        let circle = InputSpace::WarpedBox { density: 1.5, symmetry: Symmetry::Reciprocal };
+        let folded = InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Bilateral };
+        let circle = InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Reciprocal };
         let angles = HalfDiff { theta_h: 0.4, theta_d: 0.3, phi_d: 2.0 };
         let mirrored = HalfDiff { phi_d: PI - 2.0, ..angles };
         let (a, b) = (folded.coordinates(angles), folded.coordinates(mirrored));

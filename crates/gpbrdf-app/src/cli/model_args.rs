@@ -3,8 +3,8 @@
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::{
-    FitOptions, InputSpace, LatticeLayout, Layout, MeanFunction, Noise, OptimizeOptions, SampleSet, Shape,
-    Solver, Source, Symmetry, Transform, dense_cost, detect_symmetry,
+    FitOptions, LatticeLayout, Layout, MeanFunction, Noise, OptimizeOptions, SampleSet, Shape, Solver,
+    Source, Symmetry, Transform, dense_cost, detect_symmetry,
 };
 
 use super::terminal::Terminal;
@@ -38,7 +38,8 @@ pub(crate) struct ModelArgs {
     /// Symmetry in phi_d that samples and model rely on; auto measures it.
     #[arg(long, value_enum, default_value = "auto")]
     symmetry: SymmetryName,
-    /// Exponent that crowds the lattice's nodes at the specular peak; 1 is even in sqrt(theta_h).
+    /// Place the lattice's nodes at sqrt(theta_h) = t^EXPONENT with t evenly spaced; above 1 they crowd at the
+    /// specular peak. By default they stand on the table's cells there and spread out from it.
     #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
     node_density: Option<f64>,
     /// Exact solver.
@@ -157,11 +158,12 @@ impl ModelArgs {
                 };
                 terminal.detail(&format!("symmetry: {symmetry:?}"));
                 let mut lattice = match self.lattice {
-                    Some(shape) => LatticeLayout { shape, symmetry, ..LatticeLayout::default() },
+                    Some(shape) => LatticeLayout::with_shape(shape, symmetry),
                     None => LatticeLayout::with_samples(self.samples.unwrap_or(PAPER_SAMPLES), symmetry)?,
                 };
                 if let Some(density) = self.node_density {
                     lattice.node_density = density;
+                    lattice.node_spread = 0.0;
                 }
                 lattice.validate()?;
                 if lattice.len() > MAX_NODES {
@@ -224,7 +226,8 @@ impl ModelArgs {
             SymmetryName::Reciprocal => Symmetry::Reciprocal,
             SymmetryName::Auto | SymmetryName::Bilateral => Symmetry::Bilateral,
         };
-        let density = self.node_density.unwrap_or(LatticeLayout::default().node_density);
+        let lattice = LatticeLayout::default();
+        let density = self.node_density.unwrap_or(lattice.node_density);
         Ok(FitOptions {
             solver: match self.solver {
                 SolverName::Auto => Solver::Auto,
@@ -243,7 +246,7 @@ impl ModelArgs {
             },
             noise: self.noise.0,
             per_channel: self.per_channel,
-            space: InputSpace::WarpedBox { density, symmetry },
+            space: LatticeLayout { node_density: density, symmetry, ..lattice }.space(),
             optimize: OptimizeOptions {
                 restarts: self.restarts,
                 seed: self.seed,

@@ -13,8 +13,9 @@ use rayon::prelude::*;
 
 use crate::angles::theta_d_max;
 use crate::gp::lattice::{LatticeGp, square};
+use crate::kernel::GridScratch;
 use crate::layout::Symmetry;
-use crate::simd::vectorized;
+use crate::simd::{exp_slice, vectorized};
 use crate::space::InputSpace;
 use crate::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 
@@ -35,11 +36,12 @@ pub(super) fn bake_means<S: Send>(
     let along_phi = gp.cross(2, &phi_coordinates(symmetry));
     let contracted: Vec<Mat<f64>> =
         gp.weights().chunks(nodes).map(|weights| contract_u(gp, weights, &along_u)).collect();
-    slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
+    let exponent = v_exponent(space);
+    slabs.enumerate().for_each_init(Column::new, |column, (i, mut slab)| {
         let weights: Vec<Mat<f64>> = contracted.iter().map(|m| contract_phi(gp, m, i, &along_phi)).collect();
         let mut means = vec![0.0; weights.len() * N_THETA_D];
         for j in 0..N_COLUMNS {
-            column.fill(gp, i, j);
+            column.fill(gp, exponent, i, j);
             for (row, targets) in mirrored_rows(symmetry, j) {
                 column.sum_means(&weights, row, &mut means);
                 emit(&mut slab, &targets, &mut means);
@@ -57,19 +59,23 @@ pub(super) fn bake_variances<S: Send>(
     emit: impl Fn(&mut S, &[usize], &[f64]) + Sync,
 ) {
     let mut along_u = &gp.cross(0, &u_coordinates(space)) * &gp.eigen[0].vectors;
-    let mut along_phi = &gp.cross(2, &phi_coordinates(symmetry)) * &gp.eigen[2].vectors;
+    let phi = phi_coordinates(symmetry);
+    let mut along_phi = &gp.cross(2, &phi) * &gp.eigen[2].vectors;
     square(&mut along_u);
     square(&mut along_phi);
     let contracted = contract_u(gp, &gp.precision, &along_u);
-    let (prior, scale) = (gp.prior_variance(), gp.hyper().signal_variance);
-    slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
+    // Along u and v the prior variance is the same everywhere.
+    let priors: Vec<f64> = phi.iter().map(|&phi| gp.prior_variance([0.0, 0.0, phi])).collect();
+    let scale = gp.hyper().signal_variance;
+    let exponent = v_exponent(space);
+    slabs.enumerate().for_each_init(Column::new, |column, (i, mut slab)| {
         let weights = contract_phi(gp, &contracted, i, &along_phi);
         let mut variances = vec![0.0; N_THETA_D];
         for j in 0..N_COLUMNS {
-            column.fill(gp, i, j);
+            column.fill(gp, exponent, i, j);
             column.project(&gp.eigen[1].vectors);
             for (row, targets) in mirrored_rows(symmetry, j) {
-                column.sum_variances(&weights, row, prior, scale, &mut variances);
+                column.sum_variances(&weights, row, priors[row], scale, &mut variances);
                 emit(&mut slab, &targets, &variances);
             }
         }
@@ -79,6 +85,14 @@ pub(super) fn bake_variances<S: Send>(
 /// First kernel coordinate of the cells along `theta_h`.
 fn u_coordinates(space: InputSpace) -> Vec<f64> {
     (0..N_THETA_H).map(|i| space.warp_u((i as f64 + 0.5) / N_THETA_H as f64)).collect()
+}
+
+/// The second kernel coordinate is `v` to this power.
+fn v_exponent(space: InputSpace) -> f64 {
+    match space {
+        InputSpace::WarpedBox { v_density, .. } => v_density.recip(),
+        InputSpace::HalfDiff => 1.0,
+    }
 }
 
 /// Third kernel coordinate of the cells along `phi_d`; a bilateral process is the same on both halves.
@@ -114,42 +128,46 @@ fn contract_phi(gp: &LatticeGp, contracted: &Mat<f64>, i: usize, along_phi: &Mat
 }
 
 /// Kernel values along one column.
-#[derive(Default)]
 struct Column {
-    /// `v` of the cells above the horizon, then one 1 that stands for all others.
+    /// `ln theta_d` of the cells.
+    log_theta_d: Vec<f64>,
+    /// Warped `v` of the cells above the horizon, then one 1 that stands for all others.
     v: Vec<f64>,
     /// `[node][cell]`.
     kernels: Vec<f64>,
     /// `kernels` in the eigenbasis of `v`.
     projected: Vec<f64>,
+    scratch: GridScratch,
 }
 
 impl Column {
+    fn new() -> Self {
+        let theta_d = |l: usize| (l as f64 + 0.5) / N_THETA_D as f64 * FRAC_PI_2;
+        Self {
+            log_theta_d: (0..N_THETA_D).map(|l| theta_d(l).ln()).collect(),
+            v: Vec::new(),
+            kernels: Vec::new(),
+            projected: Vec::new(),
+            scratch: GridScratch::default(),
+        }
+    }
+
     /// Takes the column of `i_theta_h = i` and `i_phi_d = j`.
-    fn fill(&mut self, gp: &LatticeGp, i: usize, j: usize) {
+    fn fill(&mut self, gp: &LatticeGp, exponent: f64, i: usize, j: usize) {
         let center = cell_center(i, 0, j);
-        let limit = theta_d_max(center.theta_h, center.phi_d);
+        let log_limit = theta_d_max(center.theta_h, center.phi_d).ln();
+        // v^exponent = (theta_d / theta_d_max)^exponent.
         self.v.clear();
-        for l in 0..N_THETA_D {
-            let theta_d = (l as f64 + 0.5) / N_THETA_D as f64 * FRAC_PI_2;
-            if theta_d >= limit {
-                self.v.push(1.0);
-                break;
-            }
-            self.v.push(theta_d / limit);
+        let above = self.log_theta_d.iter().take_while(|log_theta_d| **log_theta_d < log_limit);
+        self.v.extend(above.map(|log_theta_d| exponent * (log_theta_d - log_limit)));
+        exp_slice(&mut self.v);
+        if self.v.len() < N_THETA_D {
+            self.v.push(1.0);
         }
         let nodes = &gp.data().coordinates[1];
         self.kernels.resize(nodes.len() * self.v.len(), 0.0);
-        let (kernels, v) = (&mut self.kernels, &self.v);
         // The metric along v is the plain distance in every space.
-        vectorized(|| {
-            for (out, &node) in kernels.chunks_exact_mut(v.len()).zip(nodes) {
-                for (out, &v) in out.iter_mut().zip(v) {
-                    *out = (v - node) * (v - node);
-                }
-            }
-        });
-        gp.hyper().kernels[1].fill(&mut self.kernels);
+        gp.hyper().kernels[1].fill_grid(&self.v, nodes, &mut self.scratch, &mut self.kernels);
     }
 
     fn project(&mut self, vectors: &Mat<f64>) {
@@ -163,34 +181,43 @@ impl Column {
     /// Means `[channel][cell]` of one row of the contracted weights of each channel.
     fn sum_means(&self, weights: &[Mat<f64>], row: usize, means: &mut [f64]) {
         let count = self.v.len();
-        vectorized(|| {
-            for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
-                let (sums, below) = means.split_at_mut(count);
-                sums.fill(0.0);
-                for (node, kernels) in self.kernels.chunks_exact(count).enumerate() {
-                    let weight = weights[(row, node)];
-                    for (sum, kernel) in sums.iter_mut().zip(kernels) {
-                        *sum += weight * kernel;
-                    }
-                }
-                below.fill(sums[count - 1]);
-            }
-        });
+        for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
+            let (sums, below) = means.split_at_mut(count);
+            let weights: Vec<f64> = weights.row(row).iter().copied().collect();
+            vectorized(|| weighted_sum(&weights, &self.kernels, sums));
+            below.fill(sums[count - 1]);
+        }
     }
 
+    /// Latent variances `[cell]` of one row of the contracted precisions.
     fn sum_variances(&self, weights: &Mat<f64>, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);
-        vectorized(|| {
-            sums.fill(prior);
-            for (node, projected) in self.projected.chunks_exact(count).enumerate() {
-                let weight = weights[(row, node)];
-                for (sum, p) in sums.iter_mut().zip(projected) {
-                    *sum -= weight * p * p;
-                }
-            }
-        });
-        sums.iter_mut().for_each(|x| *x = (scale * *x).max(0.0));
+        let weights: Vec<f64> = weights.row(row).iter().copied().collect();
+        vectorized(|| weighted_sum_of_squares(&weights, &self.projected, sums));
+        sums.iter_mut().for_each(|x| *x = (scale * (prior - *x)).max(0.0));
         below.fill(sums[count - 1]);
+    }
+}
+
+/// `sums[i] = sum_j weights[j] values[j][i]`.
+#[inline(always)]
+fn weighted_sum(weights: &[f64], values: &[f64], sums: &mut [f64]) {
+    sums.fill(0.0);
+    for (values, weight) in values.chunks_exact(sums.len()).zip(weights) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += weight * value;
+        }
+    }
+}
+
+/// `sums[i] = sum_j weights[j] values[j][i]^2`.
+#[inline(always)]
+fn weighted_sum_of_squares(weights: &[f64], values: &[f64], sums: &mut [f64]) {
+    sums.fill(0.0);
+    for (values, weight) in values.chunks_exact(sums.len()).zip(weights) {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += weight * (value * value);
+        }
     }
 }

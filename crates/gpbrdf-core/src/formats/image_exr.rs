@@ -28,6 +28,8 @@ pub fn write_image_exr(to: impl Write + Seek, width: usize, height: usize, pixel
 
 #[cfg(test)]
 mod tests {
+    use exr::prelude::{ReadChannels, ReadLayers};
+
     use super::*;
 
     #[test]

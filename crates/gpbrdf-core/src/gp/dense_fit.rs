@@ -153,7 +153,9 @@ mod tests {
         let (gp, _) = fit_dense(&x, &both, &metrics, &shapes, Noise::Fixed(0.01), &options).unwrap();
         assert_eq!((gp.noise_variance(), gp.channels(), gp.n_samples()), (0.01, 2, 40));
         assert!(fit_dense(&x, &[], &metrics, &shapes, Noise::Optimized, &options).is_err());
-        assert!(fit_dense(&x, &[y.clone()], &metrics, &shapes, Noise::Fixed(-1.0), &options).is_err());
+        assert!(
+            fit_dense(&x, std::slice::from_ref(&y), &metrics, &shapes, Noise::Fixed(-1.0), &options).is_err()
+        );
         assert!(fit_dense(&x[1..], &[y], &metrics, &shapes, Noise::Optimized, &options).is_err());
     }
 }

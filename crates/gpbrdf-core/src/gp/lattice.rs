@@ -23,6 +23,9 @@ pub struct LatticeData {
     pub coordinates: [Vec<f64>; 3],
     /// How distance is measured along each axis.
     pub metrics: [AxisMetric; 3],
+    /// Whether functions of each axis are even: the kernel is then `k(x, y) + k(x, -y)`. With the chord metric they
+    /// are even about `pi/2` too, and the process is that of the whole circle given mirrored targets.
+    pub mirrored: [bool; 3],
     /// `[channel][A][B][C]`, last axis fastest; zero mean.
     pub targets: Vec<f64>,
     /// Number of channels; they share hyper-parameters.
@@ -59,6 +62,9 @@ pub(crate) struct AxisEigen {
     pub(crate) vectors: Mat<f64>,
     pub(crate) values: Vec<f64>,
 }
+
+/// For each axis the derivatives of its covariance in the log-parameters of its kernel.
+type AxisSlopes = [Vec<Mat<f64>>; 3];
 
 impl AxisEigen {
     fn new(gram: &Mat<f64>) -> Result<Self> {
@@ -132,7 +138,18 @@ impl LatticeData {
                 }
             }
         }
-        Self { coordinates, metrics: self.metrics, targets, channels: self.channels }
+        Self { coordinates, metrics: self.metrics, mirrored: self.mirrored, targets, channels: self.channels }
+    }
+
+    /// The mirror image of a coordinate of axis `k`, where there is one.
+    fn image(&self, k: usize, x: f64) -> Option<f64> {
+        self.mirrored[k].then_some(-x)
+    }
+
+    /// `k(x, x)` of axis `k`.
+    fn axis_variance(&self, k: usize, kernel: &Kernel1d, x: f64) -> f64 {
+        let image = self.image(k, x).map(|image| kernel.value(self.metrics[k].distance(x, image)));
+        kernel.value(0.0) + image.unwrap_or(0.0)
     }
 
     /// The covariance of axis `k` and its derivatives in the kernel's log-parameters.
@@ -145,13 +162,16 @@ impl LatticeData {
         let mut row = vec![0.0; count];
         for j in 0..n {
             for i in j..n {
-                let distance = metric.distance(x[i], x[j]);
                 row.fill(0.0);
-                let value = if derivatives {
-                    kernel.add_gradient(distance, 1.0, &mut row)
-                } else {
-                    kernel.value(distance)
-                };
+                let mut value = 0.0;
+                for other in std::iter::once(x[j]).chain(self.image(k, x[j])) {
+                    let distance = metric.distance(x[i], other);
+                    value += if derivatives {
+                        kernel.add_gradient(distance, 1.0, &mut row)
+                    } else {
+                        kernel.value(distance)
+                    };
+                }
                 gram[(i, j)] = value;
                 gram[(j, i)] = value;
                 for (slope, &d) in slopes.iter_mut().zip(&row) {
@@ -164,11 +184,7 @@ impl LatticeData {
     }
 
     /// Eigendecompositions of the three axes, and the derivatives of their covariances.
-    fn eigen(
-        &self,
-        kernels: &[Kernel1d; 3],
-        derivatives: bool,
-    ) -> Result<([AxisEigen; 3], [Vec<Mat<f64>>; 3])> {
+    fn eigen(&self, kernels: &[Kernel1d; 3], derivatives: bool) -> Result<([AxisEigen; 3], AxisSlopes)> {
         let axis = |k: usize| -> Result<_> {
             let (gram, slopes) = self.gram(k, &kernels[k], derivatives);
             Ok((AxisEigen::new(&gram)?, slopes))
@@ -212,7 +228,7 @@ impl LatticeData {
 /// Targets and noise in the eigenbasis.
 struct Spectrum {
     eigen: [AxisEigen; 3],
-    slopes: [Vec<Mat<f64>>; 3],
+    slopes: AxisSlopes,
     ratio: f64,
     /// Targets in the eigenbasis.
     z: Vec<f64>,
@@ -352,14 +368,16 @@ impl LatticeGp {
     #[must_use]
     pub(crate) fn cross(&self, k: usize, points: &[f64]) -> Mat<f64> {
         let mut out = Mat::zeros(points.len(), self.data.coordinates[k].len());
-        for (mut column, &node) in out.col_iter_mut().zip(&self.data.coordinates[k]) {
-            let column = column.as_mut().try_as_col_major_mut().map(|c| c.as_slice_mut());
-            if let Some(column) = column {
-                for (out, &x) in column.iter_mut().zip(points) {
-                    *out = self.data.metrics[k].distance(x, node).powi(2);
-                }
-                self.hyper.kernels[k].fill(column);
+        let (kernel, metric) = (&self.hyper.kernels[k], self.data.metrics[k]);
+        let (mut sums, mut values) = (vec![0.0; points.len()], vec![0.0; points.len()]);
+        for (column, &node) in out.col_iter_mut().zip(&self.data.coordinates[k]) {
+            sums.fill(0.0);
+            for other in std::iter::once(node).chain(self.data.image(k, node)) {
+                values.iter_mut().zip(points).for_each(|(d, &x)| *d = metric.distance(x, other).powi(2));
+                kernel.fill(&mut values);
+                sums.iter_mut().zip(&values).for_each(|(sum, value)| *sum += value);
             }
+            column.iter_mut().zip(&sums).for_each(|(out, sum)| *out = *sum);
         }
         out
     }
@@ -412,7 +430,6 @@ impl LatticeGp {
     #[must_use]
     pub fn predict_variance_latent(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let [a, b, c] = self.data.shape();
-        let prior = self.prior_variance();
         points
             .par_chunks(64)
             .flat_map_iter(|points| {
@@ -431,17 +448,17 @@ impl LatticeGp {
                             let row: f64 = (0..c).map(|k| contracted[(j * c + k, p)] * sp[(p, k)]).sum();
                             explained += row * sv[(p, j)];
                         }
-                        (self.hyper.signal_variance * (prior - explained)).max(0.0)
+                        (self.hyper.signal_variance * (self.prior_variance(points[p]) - explained)).max(0.0)
                     })
                     .collect::<Vec<_>>()
             })
             .collect()
     }
 
-    /// `k(x, x)` without the signal variance.
+    /// `k(x, x)` without the signal variance, at kernel coordinates `x`.
     #[must_use]
-    pub(crate) fn prior_variance(&self) -> f64 {
-        self.hyper.kernels.iter().map(|k| k.value(0.0)).product()
+    pub(crate) fn prior_variance(&self, x: [f64; 3]) -> f64 {
+        (0..3).map(|k| self.data.axis_variance(k, &self.hyper.kernels[k], x[k])).product()
     }
 
     fn cross_rows(&self, points: &[[f64; 3]]) -> [Mat<f64>; 3] {
@@ -496,7 +513,11 @@ mod tests {
     use crate::kernel::{Shape, Term1d};
     use nalgebra::{DMatrix, DVector};
 
-    /// Every closed and general shape in some axis, sums, both metrics.
+    /// The kinds of third axis: metric, and whether it is mirrored.
+    const AXES: [(AxisMetric, bool); 3] =
+        [(AxisMetric::Linear, false), (AxisMetric::Chord, false), (AxisMetric::Chord, true)];
+
+    /// Every closed and general shape in some axis, and sums.
     fn cases() -> Vec<LatticeHyper> {
         let single = Kernel1d::new;
         let sum = Kernel1d {
@@ -522,7 +543,7 @@ mod tests {
         axes.map(|kernels| LatticeHyper { signal_variance: 1.7, noise_variance: 0.01, kernels }).into()
     }
 
-    fn data(metric: AxisMetric) -> LatticeData {
+    fn data((metric, mirrored): (AxisMetric, bool)) -> LatticeData {
         let mut random = SplitMix64(5);
         let mut axis = |n: usize, extent: f64| -> Vec<f64> {
             (0..n).map(|i| extent * (i as f64 + 0.6 * random.next_unit()) / n as f64).collect()
@@ -533,6 +554,7 @@ mod tests {
         LatticeData {
             coordinates,
             metrics: [AxisMetric::Linear, AxisMetric::Linear, metric],
+            mirrored: [false, false, mirrored],
             targets,
             channels,
         }
@@ -551,7 +573,8 @@ mod tests {
     }
 
     fn kernel(data: &LatticeData, hyper: &LatticeHyper, a: &[f64; 3], b: &[f64; 3]) -> f64 {
-        let factor = |k: usize| hyper.kernels[k].value(data.metrics[k].distance(a[k], b[k]));
+        let one = |k: usize, b: f64| hyper.kernels[k].value(data.metrics[k].distance(a[k], b));
+        let factor = |k: usize| one(k, b[k]) + if data.mirrored[k] { one(k, -b[k]) } else { 0.0 };
         hyper.signal_variance * factor(0) * factor(1) * factor(2)
     }
 
@@ -566,8 +589,8 @@ mod tests {
 
     #[test]
     fn agrees_with_the_dense_process_written_out() {
-        for metric in [AxisMetric::Linear, AxisMetric::Chord] {
-            let data = data(metric);
+        for axis in AXES {
+            let data = data(axis);
             let n = data.len();
             let x = points(&data);
             for hyper in cases() {
@@ -604,8 +627,8 @@ mod tests {
 
     #[test]
     fn gradients_agree_with_finite_differences() {
-        for metric in [AxisMetric::Linear, AxisMetric::Chord] {
-            let data = data(metric);
+        for axis in AXES {
+            let data = data(axis);
             for hyper in cases() {
                 let at = data.likelihood(&hyper).unwrap();
                 let check = |slope: f64, move_by: &dyn Fn(f64) -> LatticeHyper| {
@@ -644,7 +667,7 @@ mod tests {
 
     #[test]
     fn the_profiled_signal_variance_is_the_best_one() {
-        let data = data(AxisMetric::Linear);
+        let data = data(AXES[0]);
         let hyper = &cases()[0];
         let (signal_variance, best) = data.profile_likelihood(&hyper.kernels, 0.05).unwrap();
         assert!((best.d_signal + best.d_noise).abs() < 1e-9);
@@ -658,7 +681,7 @@ mod tests {
 
     #[test]
     fn results_do_not_depend_on_the_number_of_threads() {
-        let data = data(AxisMetric::Chord);
+        let data = data(AXES[1]);
         let hyper = &cases()[2];
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -671,8 +694,38 @@ mod tests {
     }
 
     #[test]
+    fn a_mirrored_lattice_is_the_whole_circle_with_mirrored_targets() {
+        let half = data(AXES[2]);
+        let [u, v, phi] = half.coordinates.clone();
+        let c = phi.len();
+        // Nodes at phi and pi - phi; their targets are the same.
+        let circle: Vec<f64> =
+            phi.iter().copied().chain(phi.iter().rev().map(|x| std::f64::consts::PI - x)).collect();
+        let mirror = |row: &[f64]| row.iter().chain(row.iter().rev()).copied().collect::<Vec<_>>();
+        let targets = half.targets.chunks(c).flat_map(mirror).collect();
+        let whole =
+            LatticeData { coordinates: [u, v, circle], mirrored: [false; 3], targets, ..half.clone() };
+        let hyper = cases()[0].clone();
+        // Each pair of mirrored measurements counts as two, so each has twice the noise.
+        let noisy = LatticeHyper { noise_variance: 2.0 * hyper.noise_variance, ..hyper.clone() };
+        // The process of the half has the covariance of the sum over both images: twice the average.
+        let halved = LatticeHyper {
+            signal_variance: 0.5 * hyper.signal_variance,
+            noise_variance: hyper.noise_variance,
+            ..hyper
+        };
+        let points: Vec<[f64; 3]> =
+            (0..20).map(|i| [0.05 * f64::from(i), 0.4, 0.15 * f64::from(i)]).collect();
+        let a = LatticeGp::new(half, halved).unwrap().predict_mean(&points);
+        let b = LatticeGp::new(whole, noisy).unwrap().predict_mean(&points);
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a - b).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    #[test]
     fn broken_data_is_refused() {
-        let good = data(AxisMetric::Linear);
+        let good = data(AXES[0]);
         let hyper = cases()[0].clone();
         let mut short = good.clone();
         short.targets.pop();

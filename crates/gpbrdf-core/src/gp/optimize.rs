@@ -262,7 +262,7 @@ where
     }
 }
 
-/// SplitMix64 (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014): the seeded generator of restarts and layouts.
+/// `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014): the seeded generator of restarts and layouts.
 #[derive(Clone, Debug)]
 pub(crate) struct SplitMix64(pub(crate) u64);
 
@@ -323,7 +323,7 @@ mod tests {
             let slope = |c: f64, h: f64| -16.0 * (p[0] - c) * hill(c, h);
             Ok((hill(-1.0, 1.0) + hill(1.5, 3.0), vec![slope(-1.0, 1.0) + slope(1.5, 3.0)]))
         };
-        let parameters = [parameter("p", -1.05, -2.0, 2.0)];
+        let parameters = [parameter("p", -1.0, -2.0, 2.0)];
         let stuck = maximize(&parameters, 1, &OptimizeOptions::default(), two_hills).unwrap();
         assert!((stuck.value - 1.0).abs() < 1e-3, "{stuck:?}");
         let options = OptimizeOptions { restarts: 8, seed: 3, ..Default::default() };

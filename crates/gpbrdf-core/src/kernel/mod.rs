@@ -3,12 +3,14 @@
 mod axis;
 mod bessel;
 mod composite;
+mod grid;
 mod rows;
 mod shape;
 mod slices;
 
 pub use axis::{Kernel1d, ParameterKind, Term1d};
 pub use composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
+pub(crate) use grid::GridScratch;
 pub(crate) use rows::{Points, RowScratch};
 pub use shape::Shape;
 
