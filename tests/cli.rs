@@ -1,1 +1,15 @@
-//! Command-line tests.
+//! The command line from outside: the built program on real arguments, its files, messages and exit codes.
+#![allow(clippy::unwrap_used, reason = "a test that finds nothing to unwrap has failed")]
+
+mod harness;
+
+mod cli {
+    mod bake;
+    mod broken_files;
+    mod commands;
+    mod dense;
+    mod measured;
+    mod odd_input;
+    mod process;
+    mod usage;
+}

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::{
     AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, Provenance,
@@ -23,7 +23,7 @@ const PICTURE_SIZE: usize = 160;
 pub(crate) struct Bake {
     /// A measurement, table or model file, or the name of a built-in material.
     #[arg(default_value = "cherry-235")]
-    input: String,
+    input: PathBuf,
     /// Folder for the outputs; made if need be.
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-out")]
     output: PathBuf,
@@ -55,6 +55,7 @@ struct Baked {
 impl Bake {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let start = Instant::now();
+        OutputFolder::check(&self.output)?;
         let mut seconds = Seconds::default();
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
         let environment = environment(self.env.as_deref())?;
@@ -121,9 +122,10 @@ impl Bake {
         // Disk and processor at once.
         let (binary_written, exr_written) =
             rayon::join(|| write_merl_to(&mut binary, &baked.mean), || write_exr(&mut exr, baked, truth));
-        binary_written?;
-        exr_written?;
-        std::io::Write::write_all(&mut safetensors, &model.to_bytes()?)?;
+        binary_written.with_context(|| unwritten(&binary))?;
+        exr_written.with_context(|| unwritten(&exr))?;
+        std::io::Write::write_all(&mut safetensors, &model.to_bytes()?)
+            .with_context(|| unwritten(&safetensors))?;
         files.extend([binary, exr, safetensors]);
         if !self.no_images {
             for (name, picture) in [
@@ -131,7 +133,7 @@ impl Bake {
                 ("sphere.png", sphere_picture(source, truth, baked, environment, report)?),
             ] {
                 let mut file = create_in(&folder, name, &mut report.outputs)?;
-                picture.write_png(&mut file)?;
+                picture.write_png(&mut file).with_context(|| unwritten(&file))?;
                 files.push(file);
             }
         }
@@ -139,7 +141,7 @@ impl Bake {
         report.seconds.add("write", begin);
         report.seconds.add("total", start);
         serde_json::to_writer_pretty(&mut json, report)?;
-        std::io::Write::write_all(&mut json, b"\n")?;
+        std::io::Write::write_all(&mut json, b"\n").with_context(|| unwritten(&json))?;
         files.push(json);
         AtomicFile::commit_all(files)?;
         Ok(())
@@ -150,6 +152,10 @@ fn create_in(folder: &OutputFolder, name: &str, outputs: &mut Vec<String>) -> Re
     let path = folder.join(name);
     outputs.push(path.display().to_string());
     Ok(AtomicFile::create(path)?)
+}
+
+fn unwritten(file: &AtomicFile) -> String {
+    format!("cannot write \"{}\"", file.target().display())
 }
 
 /// All metrics, with the coverage of the interval of an observation where sigma was baked.

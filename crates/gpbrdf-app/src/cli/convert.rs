@@ -15,7 +15,7 @@ use super::terminal::Terminal;
 #[derive(Args, Debug)]
 pub(crate) struct Convert {
     /// A measurement, table or model file, or the name of a built-in material.
-    input: String,
+    input: PathBuf,
     /// File to write: .binary (MERL table), .exr (table) or .csv (samples).
     output: PathBuf,
     /// Number of samples of a .csv from a source that can be asked anywhere.

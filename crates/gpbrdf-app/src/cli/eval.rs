@@ -15,9 +15,9 @@ use super::terminal::Terminal;
 #[derive(Args, Debug)]
 pub(crate) struct Eval {
     /// Model, table or measurement to judge, or a built-in material.
-    prediction: String,
+    prediction: PathBuf,
     /// Truth: a table or measurement file, or a built-in material.
-    truth: String,
+    truth: PathBuf,
     /// Environment map of the image metrics instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::{AtomicFile, Provenance, fit};
 
@@ -16,7 +16,7 @@ use super::terminal::Terminal;
 #[derive(Args, Debug)]
 pub(crate) struct Fit {
     /// A measurement or table file, or the name of a built-in material.
-    input: String,
+    input: PathBuf,
     /// Model file to write.
     #[arg(short, long, value_name = "FILE", default_value = "model.safetensors")]
     output: PathBuf,
@@ -34,6 +34,8 @@ impl Fit {
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
         let samples = seconds.measure("sample", || self.model.sample(&source, terminal))?;
         let options = self.model.fit_options()?;
+        // Before the fit: a model that cannot be written is not worth the wait.
+        let mut file = AtomicFile::create(&self.output)?;
         let provenance = Provenance {
             material: source.name.clone(),
             source: source.origin(),
@@ -45,8 +47,8 @@ impl Fit {
         let mut report = Report::new(&model, &fits, seconds);
         report.outputs.push(self.output.display().to_string());
         let begin = Instant::now();
-        let mut file = AtomicFile::create(&self.output)?;
-        file.write_all(&model.to_bytes()?)?;
+        file.write_all(&model.to_bytes()?)
+            .with_context(|| format!("cannot write \"{}\"", self.output.display()))?;
         file.commit()?;
         report.seconds.add("write", begin);
         report.seconds.add("total", start);

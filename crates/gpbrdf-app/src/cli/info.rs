@@ -1,5 +1,7 @@
 //! `gpbrdf-cli info`: what a file is.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use clap::Args;
 use gpbrdf_core::{Content, merl_material_name};
@@ -12,7 +14,7 @@ use super::terminal::Terminal;
 #[derive(Args, Debug)]
 pub(crate) struct Info {
     /// A file, or the name of a built-in material.
-    input: String,
+    input: PathBuf,
     /// Print JSON.
     #[arg(long)]
     json: bool,

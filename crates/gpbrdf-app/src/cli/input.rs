@@ -6,16 +6,23 @@ use anyhow::{Result, bail};
 use gpbrdf_core::{Environment, Source, materials};
 
 /// Opens `input`: a file if there is one of that name, else a built-in material.
-pub(crate) fn open(input: &str) -> Result<Source> {
-    let path = Path::new(input);
-    if path.exists() || path.is_symlink() {
-        return Ok(Source::open(path)?);
+pub(crate) fn open(input: &Path) -> Result<Source> {
+    if let Ok(metadata) = input.metadata()
+        && !metadata.is_file()
+        && !metadata.is_dir()
+    {
+        // Its kind is found before it is read: a pipe would be drained by then.
+        bail!("\"{}\": expected a regular file, found a pipe or a device", input.display());
     }
-    if materials().iter().any(|m| m.name == input) {
-        return Ok(Source::built_in(input)?);
+    if input.exists() || input.is_symlink() {
+        return Ok(Source::open(input)?);
+    }
+    if let Some(material) = materials().iter().find(|m| input.as_os_str() == m.name) {
+        return Ok(Source::built_in(material.name)?);
     }
     bail!(
-        "\"{input}\": expected a file or a built-in material (`gpbrdf-cli materials` lists them), found neither"
+        "\"{}\": expected a file or a built-in material (`gpbrdf-cli materials` lists them), found neither",
+        input.display()
     );
 }
 
@@ -35,6 +42,20 @@ pub(crate) struct OutputFolder {
 }
 
 impl OutputFolder {
+    /// Refuses, before the work that leads up to it, a path that can be no folder.
+    pub(crate) fn check(path: &Path) -> Result<()> {
+        match path.ancestors().find(|p| p.exists()) {
+            Some(existing) if !existing.is_dir() => {
+                bail!(
+                    "cannot create folder \"{}\": expected a folder, found the file \"{}\"",
+                    path.display(),
+                    existing.display()
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+
     pub(crate) fn create(path: &Path) -> Result<Self> {
         let mut created: Vec<PathBuf> = path
             .ancestors()

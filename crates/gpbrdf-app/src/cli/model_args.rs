@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::{
     FitOptions, LatticeLayout, Layout, MeanFunction, Noise, OptimizeOptions, SampleSet, Shape, Solver,
-    Source, Symmetry, Transform, detect_symmetry,
+    Source, Symmetry, Transform, dense_cost, detect_symmetry,
 };
 
 use super::terminal::Terminal;
@@ -14,6 +14,15 @@ const PAPER_SAMPLES: usize = 37_616;
 
 /// Samples off a lattice are solved densely: a number that takes seconds.
 const DENSE_SAMPLES: usize = 2_000;
+
+/// The largest lattice: more nodes than this are no samples of a table of 1,458,000 cells, and take gigabytes.
+const MAX_NODES: usize = 1 << 22;
+
+/// Evaluations of likelihood and gradient that a dense search usually takes.
+const TYPICAL_EVALUATIONS: usize = 40;
+
+/// Fewer samples than this take a second and a few MB: nothing to foretell.
+const SHORT_DENSE_RUN: usize = 1000;
 
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ModelArgs {
@@ -31,7 +40,7 @@ pub(crate) struct ModelArgs {
     symmetry: SymmetryName,
     /// Place the lattice's nodes at sqrt(theta_h) = t^EXPONENT with t evenly spaced; above 1 they crowd at the
     /// specular peak. By default they stand on the table's cells there and spread out from it.
-    #[arg(long, value_name = "EXPONENT")]
+    #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
     node_density: Option<f64>,
     /// Exact solver.
     #[arg(long, value_enum, default_value = "auto")]
@@ -40,19 +49,19 @@ pub(crate) struct ModelArgs {
     #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value = "matern52")]
     kernel: String,
     /// Smoothness of `--kernel matern`.
-    #[arg(long, value_name = "NU", default_value_t = 1.5)]
+    #[arg(long, value_name = "NU", default_value_t = 1.5, allow_hyphen_values = true)]
     nu: f64,
     /// What is fitted: ln(f + epsilon), f itself or its cube root.
     #[arg(long, value_enum, default_value = "log")]
     transform: TransformName,
     /// Epsilon of `--transform log`, sr^-1.
-    #[arg(long, value_name = "VALUE", default_value_t = 1e-3)]
+    #[arg(long, value_name = "VALUE", default_value_t = 1e-3, allow_hyphen_values = true)]
     epsilon: f64,
     /// Prior mean.
     #[arg(long, value_enum, default_value = "constant")]
     mean: MeanName,
     /// Noise variance in squared target units, or auto to find it.
-    #[arg(long, value_name = "VARIANCE|auto", default_value = "auto", value_parser = parse_noise)]
+    #[arg(long, value_name = "VARIANCE|auto", default_value = "auto", value_parser = parse_noise, allow_hyphen_values = true)]
     noise: NoiseArg,
     /// Seed of random layouts and restarts.
     #[arg(long, value_name = "SEED", default_value_t = 0)]
@@ -131,7 +140,13 @@ impl ModelArgs {
                     samples.samples.len()
                 );
             }
+            self.foretell(samples.samples.len(), terminal)?;
             return Ok(SampleSet::from(samples));
+        }
+        if let gpbrdf_core::Content::Table(table) = &source.content
+            && !table.values().iter().any(|v| v.iter().all(|&x| x >= 0.0))
+        {
+            bail!("{}: expected data in at least one cell, found none", source.origin());
         }
         let Some(brdf) = source.brdf() else { bail!("{}: nothing to sample", source.origin()) };
         let layout = match self.layout {
@@ -150,13 +165,28 @@ impl ModelArgs {
                     lattice.node_density = density;
                     lattice.node_spread = 0.0;
                 }
+                lattice.validate()?;
+                if lattice.len() > MAX_NODES {
+                    let [a, b, c] = lattice.shape;
+                    bail!(
+                        "--lattice: expected at most {MAX_NODES} nodes, found {a}x{b}x{c} = {}",
+                        lattice.len()
+                    );
+                }
+                if matches!(self.solver, SolverName::Dense) {
+                    self.foretell(lattice.len(), terminal)?;
+                }
                 Layout::Lattice(lattice)
             }
             name => {
                 if self.lattice.is_some() {
                     bail!("--lattice: expected --layout lattice, found another layout");
                 }
+                if matches!(self.solver, SolverName::Lattice) {
+                    bail!("--solver lattice: expected --layout lattice, found another layout");
+                }
                 let count = self.samples.unwrap_or(DENSE_SAMPLES);
+                self.foretell(count, terminal)?;
                 if name == LayoutName::Random {
                     Layout::Random { count, seed: self.seed }
                 } else {
@@ -165,6 +195,27 @@ impl ModelArgs {
             }
         };
         Ok(SampleSet::measure(brdf, &layout)?)
+    }
+
+    /// Tells what a dense fit to `samples` samples will take if that is long, and refuses it if it will not fit in
+    /// memory; before anything is sampled.
+    fn foretell(&self, samples: usize, terminal: &Terminal) -> Result<()> {
+        if samples < SHORT_DENSE_RUN {
+            return Ok(());
+        }
+        let mut cost = dense_cost(samples, 3, TYPICAL_EVALUATIONS);
+        if self.per_channel {
+            cost.seconds *= 3.0;
+        }
+        cost.check()?;
+        if cost.seconds > 10.0 {
+            terminal.note(&format!(
+                "a dense fit to {samples} samples takes {:.1} GiB and about {:.0} s",
+                cost.bytes / (1u64 << 30) as f64,
+                cost.seconds
+            ));
+        }
+        Ok(())
     }
 
     /// The options of the fit.

@@ -12,12 +12,12 @@ use super::terminal::Terminal;
 #[derive(Args, Debug)]
 pub(crate) struct SliceCommand {
     /// A measurement, table or model file, or the name of a built-in material.
-    input: String,
+    input: PathBuf,
     /// Picture to write: .png (as shown) or .exr (values in 1/sr).
     #[arg(short, long, value_name = "FILE", default_value = "slice.png")]
     output: PathBuf,
     /// phi_d in degrees; at 90 every direction is above the horizon.
-    #[arg(long, value_name = "DEGREES", default_value_t = 90.0)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 90.0, allow_hyphen_values = true)]
     phi_d: f64,
     /// Exposure in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
@@ -27,7 +27,7 @@ pub(crate) struct SliceCommand {
     square_theta_h: bool,
     /// Show beside a truth, with their difference.
     #[arg(long, value_name = "TRUTH")]
-    difference: Option<String>,
+    difference: Option<PathBuf>,
     /// Rows and columns of a slice.
     #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=4096))]
     size: u32,
@@ -35,9 +35,9 @@ pub(crate) struct SliceCommand {
 
 impl SliceCommand {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let raw = match self.output.extension().and_then(|e| e.to_str()) {
-            Some("png") => false,
-            Some("exr") => true,
+        let raw = match self.output.extension() {
+            Some(png) if png.eq_ignore_ascii_case("png") => false,
+            Some(exr) if exr.eq_ignore_ascii_case("exr") => true,
             _ => bail!("\"{}\": expected a name that ends in .png or .exr", self.output.display()),
         };
         for (what, value) in [("--phi-d", self.phi_d), ("--exposure", self.exposure)] {

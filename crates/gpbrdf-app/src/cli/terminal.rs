@@ -36,6 +36,13 @@ impl Terminal {
         }
     }
 
+    /// Writes what is good to know beforehand to standard error, unless quiet.
+    pub(crate) fn note(&self, text: &str) {
+        if !self.quiet {
+            eprintln!("note: {text}");
+        }
+    }
+
     /// Writes a warning to standard error, unless quiet.
     pub(crate) fn warn(&self, text: &str) {
         if !self.quiet {

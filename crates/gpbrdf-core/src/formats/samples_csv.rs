@@ -220,6 +220,12 @@ impl Source<'_> {
                     found.to_string(),
                 ));
             }
+            if found > f64::from(f32::MAX) {
+                return Err(self.wrong(
+                    format!("a value within the range of f32 {}", place(record, header, index)),
+                    format!("{found:e}"),
+                ));
+            }
             *channel = found;
         }
         Ok(value)
@@ -448,6 +454,10 @@ mod tests {
         assert_eq!(row("1,2,3,4,5,NaN,7"), "a finite number in column `g` on line 4, found \"NaN\"");
         assert_eq!(row("1,,3,4,5,6,7"), "a finite number in column `phi_i` on line 4, found nothing");
         assert_eq!(row("1,2,3"), "a finite number in column `phi_o` on line 4, found only 3 columns");
+        assert_eq!(
+            row("1,2,3,4,5,6,7e38"),
+            "a value within the range of f32 in column `b` on line 4, found 7e38"
+        );
         assert_eq!(row("1,2,3,4,-5,6,7"), "a value of at least 0 in column `r` on line 4, found -5");
         assert_eq!(
             row("1,2,95,4,5,6,7"),
