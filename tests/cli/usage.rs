@@ -42,14 +42,10 @@ fn values_out_of_range_are_refused() {
     cli.write("one.csv", "theta_i,phi_i,theta_o,phi_o,f\n10,0,20,0,1\n");
     let begin = Instant::now();
     for (arguments, message) in [
-        (&["--samples", "0"][..], "number of samples: expected at least 8, found 0"),
-        (&["--samples", "7"], "number of samples: expected at least 8, found 7"),
+        (&["--samples", "0"][..], "number of samples: expected at least 12, found 0"),
+        (&["--samples", "11"], "number of samples: expected at least 12, found 11"),
         (&["--lattice", "0x6x6"], "lattice shape: expected 2 to 512 nodes along each axis, found 0x6x6"),
         (&["--lattice", "6x6x513"], "lattice shape: expected 2 to 512 nodes along each axis, found 6x6x513"),
-        (
-            &["--samples", "1000000000000"],
-            "lattice shape: expected 2 to 512 nodes along each axis, found 14423x9615x7211",
-        ),
         (
             &["--lattice", "512x512x512"],
             "--lattice: expected at most 4194304 nodes, found 512x512x512 = 134217728",
@@ -100,6 +96,11 @@ fn values_out_of_range_are_refused() {
     ] {
         assert_eq!(cli.fails(&[&["bake", "phong"], arguments].concat()), message);
     }
+    let message = cli.fails(&["bake", "phong", "--samples", "1000000000000"]);
+    assert!(
+        message.starts_with("lattice shape: expected 2 to 512 nodes along each axis, found "),
+        "{message}"
+    );
     assert_eq!(
         cli.fails(&["bake", "one.csv", "--samples", "20"]),
         "one.csv: expected no --lattice and no --samples for scattered measurements, found one: all 1 are used"
