@@ -140,6 +140,12 @@ impl BrdfTable {
         self.values[cell_index(i_theta_h, i_theta_d, i_phi_d)]
     }
 
+    /// Whether any of the cells of a lookup that count has data.
+    fn has_data(&self, at: &Trilinear) -> bool {
+        let data = |cell: u32| self.values[cell as usize].iter().all(|&x| x >= 0.0);
+        at.cells.iter().zip(&at.weights).any(|(&cell, &weight)| weight > 0.0 && data(cell))
+    }
+
     /// Trilinear interpolation, sr^-1. Cells without data (a negative channel) take no part, and the other
     /// weights are scaled up in their place; zero where all eight are without data.
     #[must_use]
@@ -167,8 +173,18 @@ impl Brdf for BrdfTable {
         self.eval_half_diff(HalfDiff::from_directions(wi, wo))
     }
 
+    /// Trilinear; where all eight cells are without data, the value at the nearest smaller `theta_d` that has some, as
+    /// near the horizon measured tables have gaps. Zero where there is none.
     fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
-        self.lookup(&Trilinear::new(angles)).map(f64::from)
+        let step = FRAC_PI_2 / N_THETA_D as f64;
+        let mut at = angles;
+        loop {
+            let lookup = Trilinear::new(at);
+            if self.has_data(&lookup) || !(at.theta_d > 0.0) {
+                return self.lookup(&lookup).map(f64::from);
+            }
+            at.theta_d = (at.theta_d - step).max(0.0);
+        }
     }
 }
 
@@ -227,6 +243,16 @@ mod tests {
             *value = [-1.0; 3];
         }
         assert_eq!(table.eval_half_diff(HalfDiff::default()), [0.0; 3]);
+        let gap = HalfDiff { theta_h: 0.5, theta_d: 1.0, phi_d: 1.0 };
+        let mut torn = BrdfTable::from_fn(|a| [a.theta_d, 1.0, 2.0]);
+        for index in 0..N_CELLS {
+            if cell_indices(index).1 >= 45 {
+                torn.values[index] = [-1.0; 3];
+            }
+        }
+        assert_eq!(torn.lookup(&Trilinear::new(gap)), [0.0; 3]);
+        let filled = torn.eval_half_diff(gap)[0];
+        assert!((filled - cell_center(0, 44, 0).theta_d).abs() < 1e-6, "{filled}");
         let edge = cell_center(44, 10, 10);
         let half = HalfDiff { theta_h: edge.theta_h * 1.01, ..edge };
         assert!((table.eval_half_diff(half)[1] - 1.0).abs() < 1e-6);

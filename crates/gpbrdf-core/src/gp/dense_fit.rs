@@ -40,7 +40,7 @@ pub fn fit_dense(
     let mut evaluator = DenseEvaluator::new(x, dimension, &y, channels)?;
     let extents: Vec<f64> = (0..dimension).map(|k| extent(x, dimension, k, metrics[k])).collect();
     let mut kernel = starting_kernel(&extents, metrics, shapes, variance);
-    let mut parameters = parameters(&kernel, &extents, variance);
+    let mut parameters = parameters(&kernel, &extents, n, variance);
     if noise == Noise::Optimized {
         parameters.push(Parameter {
             name: "noise_variance".into(),
@@ -97,7 +97,9 @@ fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], va
     Kernel { terms: terms.collect(), metric: metrics.to_vec() }
 }
 
-fn parameters(kernel: &Kernel, extents: &[f64], variance: f64) -> Vec<Parameter> {
+fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -> Vec<Parameter> {
+    // Below the spacing of the samples a length scale means nothing.
+    let spacing = (samples as f64).powf(-1.0 / extents.len().max(1) as f64).min(0.5);
     let kinds = kernel.parameter_kinds().into_iter();
     kinds
         .zip(kernel.parameter_names())
@@ -105,7 +107,7 @@ fn parameters(kernel: &Kernel, extents: &[f64], variance: f64) -> Vec<Parameter>
         .map(|((kind, name), start)| {
             let (lower, upper) = match kind {
                 ParameterKind::Variance => (1e-4 * variance, 1e6 * variance),
-                ParameterKind::LengthScale(k) => (1e-2 * extents[k], 30.0 * extents[k]),
+                ParameterKind::LengthScale(k) => (0.5 * spacing * extents[k], 30.0 * extents[k]),
                 ParameterKind::Alpha => (0.05, 1e3),
                 ParameterKind::Weight => (1e-5, 1e5),
             };
