@@ -1,4 +1,4 @@
-//! `gpbrdf-cli bake`: load, sample, fit, bake, compare, write.
+//! `gpbrdf-cli bake`: load, sample, bake, compare, write.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -6,9 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::{
-    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, Provenance,
-    SigmaTable, SliceOptions, Source, bake_mean, bake_sigma, fit, interval_95, render_env, slice_figure,
-    sphere_figure, write_merl_to, write_table_exr_to,
+    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, SigmaTable,
+    SliceOptions, Source, bake_mean, bake_sigma, interval_95, render_env, slice_figure, sphere_figure,
+    write_merl_to, write_table_exr_to,
 };
 
 use super::input::{OutputFolder, environment, open};
@@ -59,18 +59,7 @@ impl Bake {
         let mut seconds = Seconds::default();
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
         let environment = environment(self.env.as_deref())?;
-        let samples = seconds
-            .measure("sample", || terminal.stage("sampling", || self.model.sample(&source, terminal)))?;
-        let options = self.model.fit_options()?;
-        let provenance = Provenance {
-            material: source.name.clone(),
-            source: source.origin(),
-            sha256: source.sha256.clone(),
-            ..Provenance::default()
-        };
-        let (model, fits) =
-            seconds.measure("fit", || terminal.stage("fitting", || fit(&samples, &options, provenance)))?;
-        drop(samples);
+        let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
         let mean = seconds.measure("bake_mean", || terminal.stage("baking the mean", || bake_mean(&model)));
         let sigma = (!self.no_sigma)
             .then(|| seconds.measure("bake_sigma", || terminal.stage("baking sigma", || bake_sigma(&model))));
@@ -91,14 +80,7 @@ impl Bake {
         terminal.stage("writing", || {
             self.write(&source, truth.as_deref(), &model, &baked, &environment, &mut report, start)
         })?;
-        if !report.converged {
-            terminal.warn("the search for hyper-parameters did not converge");
-        }
-        if self.json {
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
-        } else {
-            terminal.summary(&report.summary())
-        }
+        report.show(self.json, terminal)
     }
 
     /// Writes all outputs or none.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::{AtomicFile, Provenance, fit};
+use gpbrdf_core::AtomicFile;
 
 use super::input::open;
 use super::model_args::ModelArgs;
@@ -32,18 +32,9 @@ impl Fit {
         let start = Instant::now();
         let mut seconds = Seconds::default();
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
-        let samples = seconds.measure("sample", || self.model.sample(&source, terminal))?;
-        let options = self.model.fit_options()?;
         // Before the fit: a model that cannot be written is not worth the wait.
         let mut file = AtomicFile::create(&self.output)?;
-        let provenance = Provenance {
-            material: source.name.clone(),
-            source: source.origin(),
-            sha256: source.sha256.clone(),
-            ..Provenance::default()
-        };
-        let (model, fits) =
-            seconds.measure("fit", || terminal.stage("fitting", || fit(&samples, &options, provenance)))?;
+        let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
         let mut report = Report::new(&model, &fits, seconds);
         report.outputs.push(self.output.display().to_string());
         let begin = Instant::now();
@@ -52,13 +43,6 @@ impl Fit {
         file.commit()?;
         report.seconds.add("write", begin);
         report.seconds.add("total", start);
-        if !report.converged {
-            terminal.warn("the search for hyper-parameters did not converge");
-        }
-        if self.json {
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&report)?))
-        } else {
-            terminal.summary(&report.summary())
-        }
+        report.show(self.json, terminal)
     }
 }

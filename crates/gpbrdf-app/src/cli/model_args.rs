@@ -3,10 +3,11 @@
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::{
-    FitOptions, LatticeLayout, Layout, MeanFunction, Noise, OptimizeOptions, SampleSet, Shape, Solver,
-    Source, Symmetry, Transform, dense_cost, detect_symmetry,
+    FitOptions, FitReport, LatticeLayout, Layout, MeanFunction, Model, Noise, OptimizeOptions, Provenance,
+    SampleSet, Shape, Solver, Source, Symmetry, Transform, dense_cost, detect_symmetry,
 };
 
+use super::report::Seconds;
 use super::terminal::Terminal;
 
 /// Number of values that the paper takes, 2.58 % of a table.
@@ -130,8 +131,29 @@ fn parse_noise(text: &str) -> Result<NoiseArg, String> {
 }
 
 impl ModelArgs {
+    /// Measures a source and fits a model to it, both as asked for.
+    pub(crate) fn sample_and_fit(
+        &self,
+        source: &Source,
+        seconds: &mut Seconds,
+        terminal: &Terminal,
+    ) -> Result<(Model, Vec<FitReport>)> {
+        let samples =
+            seconds.measure("sample", || terminal.stage("sampling", || self.sample(source, terminal)))?;
+        let options = self.fit_options()?;
+        let provenance = Provenance {
+            material: source.name.clone(),
+            source: source.origin(),
+            sha256: source.sha256.clone(),
+            ..Provenance::default()
+        };
+        Ok(seconds.measure("fit", || {
+            terminal.stage("fitting", || gpbrdf_core::fit(&samples, &options, provenance))
+        })?)
+    }
+
     /// Measures a source as asked for.
-    pub(crate) fn sample(&self, source: &Source, terminal: &Terminal) -> Result<SampleSet> {
+    fn sample(&self, source: &Source, terminal: &Terminal) -> Result<SampleSet> {
         if let gpbrdf_core::Content::Samples(samples) = &source.content {
             if self.lattice.is_some() || self.samples.is_some() {
                 bail!(
@@ -219,7 +241,7 @@ impl ModelArgs {
     }
 
     /// The options of the fit.
-    pub(crate) fn fit_options(&self) -> Result<FitOptions> {
+    fn fit_options(&self) -> Result<FitOptions> {
         let kernel =
             self.kernel.split('+').map(|name| self.shape(name.trim())).collect::<Result<Vec<_>>>()?;
         let symmetry = match self.symmetry {

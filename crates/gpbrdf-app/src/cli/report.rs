@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use anyhow::Result;
 use gpbrdf_core::{FitReport, KernelBody, LatticeLayout, Metrics, Model, Process};
 use serde::Serialize;
 use serde_json::{Value, json};
+
+use super::terminal::Terminal;
 
 /// `report.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -29,10 +32,19 @@ pub(crate) struct Report {
     pub(crate) outputs: Vec<String>,
 }
 
-/// Wall-clock seconds of each stage; absent stages did not run.
-#[derive(Clone, Debug, Default, Serialize)]
+/// Stages of a run, in order.
+const STAGES: [&str; 8] = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "write", "total"];
+
+/// Wall-clock seconds of each stage; 0 for those that did not run.
+#[derive(Clone, Debug, Serialize)]
 #[serde(transparent)]
 pub(crate) struct Seconds(BTreeMap<&'static str, f64>);
+
+impl Default for Seconds {
+    fn default() -> Self {
+        Self(STAGES.into_iter().map(|stage| (stage, 0.0)).collect())
+    }
+}
 
 impl Seconds {
     /// Adds the time that `work` takes to `stage`.
@@ -77,6 +89,18 @@ impl Report {
         }
     }
 
+    /// Prints the report: JSON, or a summary for people.
+    pub(crate) fn show(&self, json: bool, terminal: &Terminal) -> Result<()> {
+        if !self.converged {
+            terminal.warn("the search for hyper-parameters did not converge");
+        }
+        if json {
+            terminal.print(&format!("{}\n", serde_json::to_string_pretty(self)?))
+        } else {
+            terminal.summary(&self.summary())
+        }
+    }
+
     /// A few lines for people.
     pub(crate) fn summary(&self) -> String {
         let mut lines = vec![format!("{} from {}", self.material, self.source)];
@@ -100,9 +124,9 @@ impl Report {
         if let Some(m) = &self.metrics {
             lines.extend(metric_lines(m));
         }
-        let stages = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "write", "total"];
-        let shown = stages.iter().filter(|s| self.seconds.0.contains_key(**s));
-        let times: Vec<String> = shown.map(|s| format!("{s} {:.0} ms", 1e3 * self.seconds.get(s))).collect();
+        let run = STAGES.iter().filter(|stage| self.seconds.get(stage) > 0.0);
+        let times: Vec<String> =
+            run.map(|stage| format!("{stage} {:.0} ms", 1e3 * self.seconds.get(stage))).collect();
         lines.push(format!("  {}", times.join(", ")));
         for output in &self.outputs {
             lines.push(format!("  wrote {output}"));
