@@ -7,13 +7,13 @@ use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::{
     AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, SigmaTable,
-    SliceOptions, Source, bake_mean, bake_sigma, interval_95, render_env, slice_figure, sphere_figure,
-    write_merl_to, write_table_exr_to,
+    SliceOptions, Source, bake_mean, bake_sigma, render_env, slice_figure, sphere_figure, write_merl_to,
+    write_table_exr_to,
 };
 
 use super::input::{OutputFolder, environment, open};
 use super::model_args::ModelArgs;
-use super::report::{Report, Seconds};
+use super::report::{Report, Seconds, cell_interval};
 use super::terminal::Terminal;
 
 /// Pixels along each side of the pictured spheres.
@@ -148,16 +148,10 @@ fn compare_tables(
     environment: &Environment,
 ) -> Result<Metrics> {
     let noise = model.noise_variances();
-    let interval = baked.sigma.as_ref().map(|sigma| {
-        move |cell: usize| {
-            let mean = baked.mean.values()[cell];
-            let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-                let latent = f64::from(sigma.value(cell, c));
-                interval_95(model.transform, f64::from(mean[c]), (latent * latent + noise[c]).sqrt())
-            });
-            (ends.map(|e| e.0), ends.map(|e| e.1))
-        }
-    });
+    let interval = baked
+        .sigma
+        .as_ref()
+        .map(|sigma| move |cell: usize| cell_interval(model, noise, &baked.mean, sigma, cell));
     let interval = interval.as_ref().map(|f| f as &gpbrdf_core::Interval<'_>);
     Ok(Metrics::new(truth, &baked.mean, environment, interval)?)
 }

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use gpbrdf_core::{BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma, interval_95};
+use gpbrdf_core::{BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
-use super::report::{metric_lines, significant};
+use super::report::{cell_interval, metric_lines, significant};
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
@@ -54,14 +54,7 @@ impl Eval {
         let metrics = if let Content::Model(model) = &prediction.content {
             let (mean, sigma) = terminal.stage("baking", || (bake_mean(model), bake_sigma(model)));
             let noise = model.noise_variances();
-            let interval = |cell: usize| {
-                let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-                    let latent = f64::from(sigma.value(cell, c));
-                    let mean = f64::from(mean.values()[cell][c]);
-                    interval_95(model.transform, mean, (latent * latent + noise[c]).sqrt())
-                });
-                (ends.map(|e| e.0), ends.map(|e| e.1))
-            };
+            let interval = |cell: usize| cell_interval(model, noise, &mean, &sigma, cell);
             terminal
                 .stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
         } else {

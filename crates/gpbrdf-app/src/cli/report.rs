@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::Result;
-use gpbrdf_core::{FitReport, KernelBody, LatticeLayout, Metrics, Model, Process};
+use gpbrdf_core::{
+    BrdfTable, FitReport, KernelBody, LatticeLayout, Metrics, Model, Process, Rgb, SigmaTable, interval_95,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -155,6 +157,23 @@ pub(crate) fn metric_lines(m: &Metrics) -> Vec<String> {
         lines.push(format!("  95 % interval covers {:.1} % of the cells", 100.0 * coverage));
     }
     lines
+}
+
+/// The 95 % interval of a measurement in one cell of a baked table: lower and upper ends of each channel. `noise` is
+/// [`Model::noise_variances`].
+pub(crate) fn cell_interval(
+    model: &Model,
+    noise: Rgb,
+    mean: &BrdfTable,
+    sigma: &SigmaTable,
+    cell: usize,
+) -> (Rgb, Rgb) {
+    let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
+        let latent = f64::from(sigma.value(cell, c));
+        let mean = f64::from(mean.values()[cell][c]);
+        interval_95(model.transform, mean, (latent * latent + noise[c]).sqrt())
+    });
+    (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
 /// Four significant digits.

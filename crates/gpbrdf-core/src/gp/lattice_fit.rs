@@ -31,8 +31,7 @@ pub struct FitReport {
 /// The smallest ratio of noise to signal variance, which keeps the covariance positive definite in f64.
 pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
 
-/// Fits a lattice process: kernels start from `kernels`, whose length scales are taken relative to the extent of
-/// each axis if `relative_start` holds.
+/// Fits a lattice process; the search starts from the parameters of `kernels`.
 ///
 /// With [`Noise::Optimized`] the signal variance is profiled out and the search runs over the kernels and the ratio
 /// of noise to signal; with [`Noise::Fixed`] over the kernels and the signal variance. Large lattices are first fitted
