@@ -1,0 +1,1 @@
+//! Bakes Gaussian-process BRDFs into a texture on the GPU, and shades with it.
