@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
-use crate::error::{Error, Result};
-use crate::gp::{FitReport, LatticeData, Noise, OptimizeOptions, fit_dense, fit_lattice};
+use crate::condition::fit_per_axis;
+use crate::error::Result;
+use crate::gp::{FitReport, Noise, OptimizeOptions};
 use crate::kernel::{Kernel1d, Shape, Term1d};
 use crate::layout::{LatticeLayout, Symmetry, random_cells, random_directions};
-use crate::model::{Model, Process, Provenance};
+use crate::model::{Model, Provenance};
 use crate::samples::Samples;
 use crate::space::InputSpace;
 use crate::target::{MeanFunction, Transform};
@@ -167,81 +168,12 @@ pub fn fit(
     options: &FitOptions,
     provenance: Provenance,
 ) -> Result<(Model, Vec<FitReport>)> {
-    let n = samples.angles.len();
-    if n == 0 || samples.values.len() != n {
-        return Err(Error::argument("samples", "at least one, with as many values as directions", n));
-    }
-    if let Some(bad) = samples.values.as_flattened().iter().find(|x| !x.is_finite()) {
-        return Err(Error::argument("sample values", "finite numbers", bad));
-    }
-    if options.kernel.is_empty() {
-        return Err(Error::argument("kernel", "at least one shape", "none"));
-    }
-    options.kernel.iter().try_for_each(|shape| shape.validate())?;
-    options.transform.validate()?;
-    let mut targets: Vec<Vec<f64>> =
-        (0..3).map(|c| samples.values.iter().map(|v| options.transform.forward(v[c])).collect()).collect();
-    let mut offsets = [0.0; 3];
-    for (offset, targets) in offsets.iter_mut().zip(&mut targets) {
-        *offset = options.mean.offset(targets);
-        targets.iter_mut().for_each(|y| *y -= *offset);
-    }
-    let groups: Vec<Vec<Vec<f64>>> =
-        if options.per_channel { targets.into_iter().map(|t| vec![t]).collect() } else { vec![targets] };
-
-    let (space, process, reports) = match (options.solver, &samples.lattice) {
-        (Solver::Auto | Solver::Lattice, Some(lattice)) => {
-            let space = lattice.space();
-            let [u, v, phi] = lattice.nodes();
-            let coordinates = [
-                u.into_iter().map(|u| space.warp_u(u)).collect(),
-                v.into_iter().map(|v| space.warp_v(v)).collect(),
-                phi,
-            ];
-            let kernels = coordinates.each_ref().map(|x: &Vec<f64>| starting_kernel(&options.kernel, x));
-            let fitted = groups.into_iter().map(|targets| {
-                let data = LatticeData {
-                    coordinates: coordinates.clone(),
-                    metrics: space.lattice_metrics(),
-                    mirrored: space.mirrored(),
-                    channels: targets.len(),
-                    targets: targets.concat(),
-                };
-                fit_lattice(data, &kernels, options.noise, &options.optimize)
-            });
-            let (gps, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
-            (space, Process::Lattice(gps), reports)
-        }
-        (Solver::Lattice, None) => {
-            return Err(Error::argument("solver", "dense, for samples off a lattice", "lattice"));
-        }
-        (Solver::Auto | Solver::Dense, lattice) => {
-            let space = lattice.as_ref().map_or(options.space, LatticeLayout::space);
-            space.validate()?;
-            let points: Vec<[f64; 3]> = samples.angles.iter().map(|&a| space.coordinates(a)).collect();
-            let fitted = groups.into_iter().map(|targets| {
-                fit_dense(
-                    points.as_flattened(),
-                    &targets,
-                    &space.metrics(),
-                    &options.kernel,
-                    options.noise,
-                    &options.optimize,
-                )
-            });
-            let (gps, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
-            (space, Process::Dense(gps), reports)
-        }
-    };
-    let provenance =
-        Provenance { layout: samples.layout.into(), lattice: samples.lattice.clone(), ..provenance };
-    let model =
-        Model { provenance, transform: options.transform, mean: options.mean, offsets, space, process };
-    Ok((model, reports))
+    let shapes = std::array::from_fn(|_| options.kernel.as_slice());
+    fit_per_axis(samples, options, shapes, provenance, &|| false)
 }
 
 /// A sum of `shapes` of equal weight with length scales spread below the extent of `x`.
-fn starting_kernel(shapes: &[Shape], x: &[f64]) -> Kernel1d {
+pub(crate) fn starting_kernel(shapes: &[Shape], x: &[f64]) -> Kernel1d {
     let low = x.iter().copied().fold(f64::INFINITY, f64::min);
     let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let extent = (high - low).max(1e-3);

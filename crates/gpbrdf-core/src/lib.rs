@@ -44,6 +44,7 @@ mod atomic_file;
 mod bake;
 mod brdf;
 mod colormap;
+mod condition;
 mod environment;
 mod error;
 mod figure;
@@ -79,6 +80,7 @@ pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
 pub use bake::{SigmaTable, bake_mean, bake_sigma};
 pub use brdf::{Brdf, Reciprocal, Rgb};
 pub use colormap::Colormap;
+pub use condition::{Hyper, condition, fit_per_axis};
 pub use environment::{EnvDirection, Environment};
 pub use error::{Error, Result};
 pub use figure::{slice_figure, sphere_figure};
@@ -109,7 +111,10 @@ pub use samples::{Sample, Samples};
 pub use slice::{Slice, SliceOptions};
 pub use source::{Content, Source};
 pub use space::InputSpace;
-pub use sphere::{ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, render_env, render_point};
+pub use sphere::{
+    DistantLight, ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, environment_lights, render_env,
+    render_point, render_sphere,
+};
 pub use table::{
     BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, Trilinear, cell_center, cell_index, cell_indices,
 };

@@ -81,10 +81,26 @@ impl Image {
 }
 
 /// Light from one direction.
-struct Light {
-    direction: Vector3<f64>,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistantLight {
+    /// Unit direction towards the light, in camera space: `+x` right, `+y` up, `+z` towards the viewer.
+    pub direction: Vector3<f64>,
     /// Irradiance on a surface that faces the light.
-    irradiance: Rgb,
+    pub irradiance: Rgb,
+}
+
+/// The lights that stand for an environment: one for each of `patches` (columns, rows) that is not black.
+#[must_use]
+pub fn environment_lights(environment: &Environment, patches: (usize, usize)) -> Vec<DistantLight> {
+    environment
+        .average_to(patches.0, patches.1)
+        .iter()
+        .filter(|patch| patch.radiance.iter().any(|&x| x > 0.0))
+        .map(|patch| DistantLight {
+            direction: patch.direction,
+            irradiance: patch.radiance.map(|x| x * patch.solid_angle),
+        })
+        .collect()
 }
 
 /// The sphere of each table under `environment`, whose directions are those of camera space:
@@ -95,15 +111,7 @@ struct Light {
 /// depend on the number of threads. About 4 million lookups at `size` 96.
 #[must_use]
 pub fn render_env(tables: &[&BrdfTable], environment: &Environment, size: usize) -> Vec<Image> {
-    let lights: Vec<_> = environment
-        .average_to(ENV_PATCHES.0, ENV_PATCHES.1)
-        .iter()
-        .filter(|patch| patch.radiance.iter().any(|&x| x > 0.0))
-        .map(|patch| Light {
-            direction: patch.direction,
-            irradiance: patch.radiance.map(|x| x * patch.solid_angle),
-        })
-        .collect();
+    let lights = environment_lights(environment, ENV_PATCHES);
     render(tables, &lights, size)
 }
 
@@ -111,16 +119,30 @@ pub fn render_env(tables: &[&BrdfTable], environment: &Environment, size: usize)
 /// Lambertian surface that faces it has radiance 1.
 #[must_use]
 pub fn render_point(tables: &[&BrdfTable], size: usize) -> Vec<Image> {
-    let light = Light { direction: Vector3::from(POINT_LIGHT).normalize(), irradiance: [PI; 3] };
+    let light = DistantLight { direction: Vector3::from(POINT_LIGHT).normalize(), irradiance: [PI; 3] };
     render(tables, &[light], size)
 }
 
-fn render(tables: &[&BrdfTable], lights: &[Light], size: usize) -> Vec<Image> {
+fn render(tables: &[&BrdfTable], lights: &[DistantLight], size: usize) -> Vec<Image> {
+    render_sphere(tables, lights, size, &|| false).unwrap_or_default()
+}
+
+/// The sphere of each table under any lights, as [`render_env`] makes it; `None` as soon as `cancelled`, which is asked
+/// once a tile, says so.
+pub fn render_sphere(
+    tables: &[&BrdfTable],
+    lights: &[DistantLight],
+    size: usize,
+    cancelled: &(dyn Fn() -> bool + Sync),
+) -> Option<Vec<Image>> {
     let center = |i: usize| 2.0 * (i as f64 + 0.5) / size as f64 - 1.0;
     let tiles = size.div_ceil(TILE);
-    let shaded: Vec<Vec<(usize, Vec<Rgb>)>> = (0..tiles * tiles)
+    let shaded: Option<Vec<Vec<(usize, Vec<Rgb>)>>> = (0..tiles * tiles)
         .into_par_iter()
         .map(|tile| {
+            if cancelled() {
+                return None;
+            }
             let (left, top) = (tile % tiles * TILE, tile / tiles * TILE);
             let mut pixels = Vec::with_capacity(TILE * TILE);
             for row in top..(top + TILE).min(size) {
@@ -129,24 +151,24 @@ fn render(tables: &[&BrdfTable], lights: &[Light], size: usize) -> Vec<Image> {
                     pixels.extend(frame.map(|frame| (row * size + column, frame)));
                 }
             }
-            shade(tables, lights, &pixels)
+            Some(shade(tables, lights, &pixels))
         })
         .collect();
+    let shaded = shaded?;
     let mask: Vec<bool> = (0..size * size)
         .map(|i| {
             let (x, y) = (center(i % size), center(i / size));
             x * x + y * y < 1.0
         })
         .collect();
-    (0..tables.len())
-        .map(|t| {
-            let mut pixels = vec![[0.0; 3]; size * size];
-            for (i, radiance) in shaded.iter().flatten() {
-                pixels[*i] = narrow(radiance[t]);
-            }
-            Image { width: size, height: size, pixels, mask: mask.clone() }
-        })
-        .collect()
+    let images = (0..tables.len()).map(|t| {
+        let mut pixels = vec![[0.0; 3]; size * size];
+        for (i, radiance) in shaded.iter().flatten() {
+            pixels[*i] = narrow(radiance[t]);
+        }
+        Image { width: size, height: size, pixels, mask: mask.clone() }
+    });
+    Some(images.collect())
 }
 
 /// The local frame of a pixel: `e` towards the projected viewer, so that `wo = (sin, 0, cos)`.
@@ -172,7 +194,11 @@ impl Frame {
 }
 
 /// Radiance of each pixel for each table. Light by light, since neighbouring pixels read neighbouring cells.
-fn shade(tables: &[&BrdfTable], lights: &[Light], pixels: &[(usize, Frame)]) -> Vec<(usize, Vec<Rgb>)> {
+fn shade(
+    tables: &[&BrdfTable],
+    lights: &[DistantLight],
+    pixels: &[(usize, Frame)],
+) -> Vec<(usize, Vec<Rgb>)> {
     let mut radiance: Vec<_> = pixels.iter().map(|&(i, _)| (i, vec![[0.0; 3]; tables.len()])).collect();
     for light in lights {
         for ((_, frame), (_, sums)) in pixels.iter().zip(&mut radiance) {

@@ -23,6 +23,19 @@ pub fn fit_dense(
     noise: Noise,
     options: &OptimizeOptions,
 ) -> Result<(DenseGp, FitReport)> {
+    fit_dense_until(x, targets, metrics, shapes, noise, options, &|| false)
+}
+
+/// [`fit_dense`] that asks before every evaluation whether to go on.
+pub(crate) fn fit_dense_until(
+    x: &[f64],
+    targets: &[Vec<f64>],
+    metrics: &[AxisMetric],
+    shapes: &[Shape],
+    noise: Noise,
+    options: &OptimizeOptions,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<(DenseGp, FitReport)> {
     let channels = targets.len();
     let n = targets.first().map_or(0, Vec::len);
     if channels == 0 || targets.iter().any(|t| t.len() != n) {
@@ -55,6 +68,9 @@ pub fn fit_dense(
         Noise::Fixed(variance) => variance,
     };
     let found = maximize(&parameters, y.len(), options, |p| {
+        if cancelled() {
+            return Err(Error::Cancelled);
+        }
         kernel.set_log_parameters(&p[..count])?;
         let mut at = evaluator.evaluate_with_gradient(&kernel, noise_of(p))?;
         at.gradient.truncate(p.len());

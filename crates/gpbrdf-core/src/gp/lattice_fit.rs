@@ -45,6 +45,17 @@ pub fn fit_lattice(
     noise: Noise,
     options: &OptimizeOptions,
 ) -> Result<(LatticeGp, FitReport)> {
+    fit_lattice_until(data, kernels, noise, options, &|| false)
+}
+
+/// [`fit_lattice`] that asks before every evaluation whether to go on.
+pub(crate) fn fit_lattice_until(
+    data: LatticeData,
+    kernels: &[Kernel1d; 3],
+    noise: Noise,
+    options: &OptimizeOptions,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<(LatticeGp, FitReport)> {
     data.validate()?;
     kernels.iter().try_for_each(Kernel1d::validate)?;
     if let Noise::Fixed(variance) = noise
@@ -59,14 +70,14 @@ pub fn fit_lattice(
     if data.len() >= 4096 && data.shape().iter().all(|&n| n >= 12) {
         let coarse = data.decimated();
         let loose = OptimizeOptions { gradient_tolerance: 1e-2, gain_tolerance: 1e-4, ..*options };
-        let found = problem.search(&parameters, &coarse, &loose)?;
+        let found = problem.search(&parameters, &coarse, &loose, cancelled)?;
         evaluations += found.evaluations;
         for (parameter, start) in parameters.iter_mut().zip(found.log_parameters) {
             parameter.start = start;
         }
     }
     let single = OptimizeOptions { restarts: if evaluations > 0 { 0 } else { options.restarts }, ..*options };
-    let found = problem.search(&parameters, &data, &single)?;
+    let found = problem.search(&parameters, &data, &single, cancelled)?;
     evaluations += found.evaluations;
     let hyper = problem.hyper(&data, &found.log_parameters)?;
     let report = FitReport {
@@ -141,8 +152,12 @@ impl Problem {
         parameters: &[Parameter],
         data: &LatticeData,
         options: &OptimizeOptions,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Optimum> {
         maximize(parameters, data.targets.len(), options, |p| {
+            if cancelled() {
+                return Err(Error::Cancelled);
+            }
             let last = self.set(p)?.exp();
             let (likelihood, slope) = match self.noise {
                 Noise::Optimized => {

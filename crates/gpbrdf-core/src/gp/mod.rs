@@ -12,6 +12,8 @@ pub(crate) mod optimize;
 pub use cost::{DenseCost, dense_cost};
 pub use dense::{DenseEvaluator, DenseGp, DenseLikelihood, LeaveOneOut};
 pub use dense_fit::fit_dense;
+pub(crate) use dense_fit::fit_dense_until;
 pub use lattice::{LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood};
+pub(crate) use lattice_fit::fit_lattice_until;
 pub use lattice_fit::{FitReport, Noise, fit_lattice};
 pub use optimize::{OptimizeOptions, Optimum, Parameter, maximize};
