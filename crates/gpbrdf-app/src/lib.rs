@@ -1,5 +1,8 @@
-//! The command line of gpbrdf as a library: the binary only calls [`cli::main`].
+//! The programs of gpbrdf as a library: the binaries only call [`cli::main`] and `viewer::main`.
 
+#![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests state exact expectations"))]
 #![expect(clippy::doc_markdown, reason = "descriptions of arguments are shown to people as they are")]
 
 pub mod cli;
+#[cfg(feature = "viewer")]
+pub mod viewer;

@@ -1,0 +1,66 @@
+//! What the user has to read: messages stay until they are dismissed.
+
+use eframe::egui::{self, Color32, Frame, RichText, Ui};
+
+/// Messages, the oldest first.
+#[derive(Debug, Default)]
+pub(crate) struct Messages {
+    list: Vec<(bool, String)>,
+}
+
+/// More than this many, the oldest go.
+const MOST: usize = 6;
+
+impl Messages {
+    /// Says what went wrong.
+    pub(crate) fn error(&mut self, message: impl Into<String>) {
+        self.push(true, message.into());
+    }
+
+    /// Says what has been done.
+    pub(crate) fn note(&mut self, message: impl Into<String>) {
+        self.push(false, message.into());
+    }
+
+    fn push(&mut self, error: bool, message: String) {
+        if !self.list.iter().any(|(_, known)| *known == message) {
+            self.list.push((error, message));
+        }
+        if self.list.len() > MOST {
+            self.list.remove(0);
+        }
+    }
+
+    /// The messages, each with a button that dismisses it.
+    pub(crate) fn messages_ui(&mut self, ui: &mut Ui) {
+        if self.list.is_empty() {
+            return;
+        }
+        let mut read = None;
+        egui::Panel::top("messages").show_separator_line(false).show(ui, |ui| {
+            for (i, (error, message)) in self.list.iter().enumerate() {
+                let (colour, mark) = if *error {
+                    (Color32::from_rgb(0xC8, 0x3C, 0x2E), "Error")
+                } else {
+                    (Color32::from_rgb(0x2E, 0x7D, 0x52), "Done")
+                };
+                Frame::new().fill(colour).corner_radius(4).inner_margin(6).outer_margin(2).show(ui, |ui| {
+                    ui.horizontal(|ui| {
+                        ui.label(RichText::new(mark).strong().color(Color32::WHITE));
+                        let width = ui.available_width() - 80.0;
+                        ui.allocate_ui(egui::vec2(width, 0.0), |ui| {
+                            ui.set_min_width(width);
+                            ui.add(egui::Label::new(RichText::new(message).color(Color32::WHITE)).wrap());
+                        });
+                        if ui.button("Dismiss").clicked() {
+                            read = Some(i);
+                        }
+                    });
+                });
+            }
+        });
+        if let Some(i) = read {
+            self.list.remove(i);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What the program remembers from run to run.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::curves::CurveLook;
+use super::slices::SliceLook;
+use super::spheres::SphereLight;
+
+/// Files kept in the list of recent ones.
+const MAX_RECENT: usize = 12;
+
+/// Which views share the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Arrangement {
+    #[default]
+    All,
+    Slices,
+    Plots,
+    Sphere,
+}
+
+impl Arrangement {
+    pub(crate) const ALL: [Self; 4] = [Self::All, Self::Slices, Self::Plots, Self::Sphere];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::All => "Overview",
+            Self::Slices => "Slices",
+            Self::Plots => "Plots",
+            Self::Sphere => "Sphere",
+        }
+    }
+}
+
+/// What the sphere view shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum SphereShown {
+    /// Truth and prediction in one sphere, either side of a line.
+    #[default]
+    Swipe,
+    SideBySide,
+    Difference,
+    Sigma,
+}
+
+impl SphereShown {
+    pub(crate) const ALL: [Self; 4] = [Self::Swipe, Self::SideBySide, Self::Difference, Self::Sigma];
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Swipe => "Swipe",
+            Self::SideBySide => "Side by side",
+            Self::Difference => "Difference",
+            Self::Sigma => "Sigma",
+        }
+    }
+}
+
+/// Everything that is remembered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    pub(crate) recent: Vec<PathBuf>,
+    /// None follows the system.
+    pub(crate) dark: Option<bool>,
+    pub(crate) zoom: f32,
+    pub(crate) panels: bool,
+    pub(crate) arrangement: Arrangement,
+    pub(crate) slices: SliceLook,
+    pub(crate) show_samples: bool,
+    pub(crate) show_regions: bool,
+    pub(crate) curves: CurveLook,
+    pub(crate) sphere: SphereShown,
+    pub(crate) light: SphereLight,
+    /// Where the sphere is divided, in `[0, 1]`.
+    pub(crate) swipe: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            recent: Vec::new(),
+            dark: Some(true),
+            zoom: 1.0,
+            panels: true,
+            arrangement: Arrangement::All,
+            slices: SliceLook::default(),
+            show_samples: false,
+            show_regions: false,
+            curves: CurveLook::default(),
+            sphere: SphereShown::Swipe,
+            light: SphereLight::default(),
+            swipe: 0.5,
+        }
+    }
+}
+
+impl Settings {
+    /// Puts a file at the head of the recent ones.
+    pub(crate) fn remember(&mut self, path: &Path) {
+        self.recent.retain(|p| p != path);
+        self.recent.insert(0, path.to_owned());
+        self.recent.truncate(MAX_RECENT);
+    }
+}

@@ -1,0 +1,70 @@
+//! Keyboard shortcuts: one list for the keys, the menus and the help.
+
+use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
+
+/// What a key does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    Open,
+    SaveSession,
+    Screenshot,
+    TogglePanels,
+    Help,
+    ToggleLog,
+    ToggleCosine,
+    Optimise,
+    Cancel,
+    Overview,
+    Slices,
+    Plots,
+    Sphere,
+}
+
+/// Every shortcut: action, key, what it says in the help.
+pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 13] = [
+    (Action::Open, KeyboardShortcut::new(Modifiers::COMMAND, Key::O), "Open materials"),
+    (Action::SaveSession, KeyboardShortcut::new(Modifiers::COMMAND, Key::S), "Save the session"),
+    (Action::Screenshot, KeyboardShortcut::new(Modifiers::COMMAND, Key::P), "Screenshot to PNG and EXR"),
+    (Action::TogglePanels, KeyboardShortcut::new(Modifiers::NONE, Key::F1), "Hide or show the panels"),
+    (Action::Help, KeyboardShortcut::new(Modifiers::NONE, Key::H), "This help"),
+    (Action::ToggleLog, KeyboardShortcut::new(Modifiers::NONE, Key::L), "Plots: logarithmic or linear"),
+    (Action::ToggleCosine, KeyboardShortcut::new(Modifiers::NONE, Key::C), "Plots: times the cosine"),
+    (Action::Optimise, KeyboardShortcut::new(Modifiers::NONE, Key::O), "Optimise the hyper-parameters"),
+    (Action::Cancel, KeyboardShortcut::new(Modifiers::NONE, Key::Escape), "Cancel the running work"),
+    (Action::Overview, KeyboardShortcut::new(Modifiers::NONE, Key::Num1), "Show everything"),
+    (Action::Slices, KeyboardShortcut::new(Modifiers::NONE, Key::Num2), "Show slices only"),
+    (Action::Plots, KeyboardShortcut::new(Modifiers::NONE, Key::Num3), "Show plots only"),
+    (Action::Sphere, KeyboardShortcut::new(Modifiers::NONE, Key::Num4), "Show the sphere only"),
+];
+
+/// What the mouse does, for the help.
+pub(crate) const MOUSE: [(&str, &str); 7] = [
+    ("Left drag", "Pan slices and plots, turn the light of the sphere"),
+    ("Right drag, wheel", "Zoom"),
+    ("Double click", "Reset the view"),
+    ("Shift + drag", "Sphere: move the line between truth and prediction"),
+    ("Ctrl + click", "A number: back to its default"),
+    ("Drop files", "Open them"),
+    ("Ctrl + plus, minus, 0", "Larger, smaller, normal text and controls"),
+];
+
+/// The key of an action as text.
+pub(crate) fn text(ctx: &Context, action: Action) -> String {
+    let found = SHORTCUTS.iter().find(|(a, ..)| *a == action);
+    found.map_or_else(String::new, |(_, shortcut, _)| ctx.format_shortcut(shortcut))
+}
+
+/// The actions whose keys were pressed. Plain letters go to a text field that has the focus.
+pub(crate) fn pressed(ctx: &Context) -> Vec<Action> {
+    let typing = ctx.text_edit_focused();
+    let mut found = Vec::new();
+    ctx.input_mut(|input| {
+        for (action, shortcut, _) in &SHORTCUTS {
+            let plain = shortcut.modifiers == Modifiers::NONE && shortcut.logical_key != Key::F1;
+            if !(plain && typing) && input.consume_shortcut(shortcut) {
+                found.push(*action);
+            }
+        }
+    });
+    found
+}

@@ -1,0 +1,179 @@
+//! The lit sphere: truth and prediction either side of a line, their difference, sigma.
+
+use eframe::egui::{self, Color32, Rect, RichText, Sense, TextureHandle, Ui, pos2, vec2};
+use gpbrdf_core::Colormap;
+
+use super::app::{ShownSpheres, Viewer};
+use super::dialogs::Purpose;
+use super::settings::SphereShown;
+use super::slices_panel::scale_ui;
+use super::spheres::SphereLight;
+use super::widgets::{Number, reset, segments_ui, short};
+
+impl Viewer {
+    /// The sphere and its controls.
+    pub(crate) fn sphere_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Sphere").strong().size(15.0));
+            ui.add_space(6.0);
+            ui.scope(|ui| segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.menu_button("Light", |ui| self.light_ui(ui));
+            });
+        });
+        let Some(id) = self.document().map(|d| d.id) else { return };
+        let area = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(area, Sense::click_and_drag());
+        let name = "Sphere view: drag turns the light";
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, name));
+        ui.painter().rect_filled(area, 6.0, ui.visuals().extreme_bg_color);
+        let Some(shown) = self.spheres.as_ref().filter(|s| s.images.key.document == id) else {
+            ui.put(area, egui::Spinner::new().size(28.0));
+            return;
+        };
+        let top = area.top() + 8.0;
+        let picture = Rect::from_min_max(pos2(area.left() + 8.0, top), area.max - vec2(8.0, 30.0));
+        let text = ui.visuals().strong_text_color();
+        let font = egui::FontId::proportional(13.0);
+        let mode = if shown.truth.is_some() { self.settings.sphere } else { only(self.settings.sphere) };
+        let caption = |at: egui::Pos2, align: egui::Align2, words: &str| {
+            ui.painter().text(at, align, words, font.clone(), text);
+        };
+        let mut disc = square(picture);
+        match (mode, &shown.truth) {
+            (SphereShown::Swipe, Some(truth)) => {
+                let line = egui::lerp(disc.left()..=disc.right(), self.settings.swipe);
+                part(ui, truth, disc, disc.left(), line);
+                part(ui, &shown.mean, disc, line, disc.right());
+                let stroke = egui::Stroke::new(1.5, text.gamma_multiply(0.8));
+                ui.painter().line_segment([pos2(line, disc.top()), pos2(line, disc.bottom())], stroke);
+                caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "Truth");
+                caption(pos2(area.right() - 12.0, top), egui::Align2::RIGHT_TOP, "Prediction");
+            }
+            (SphereShown::SideBySide, Some(truth)) => {
+                let (left, right) = picture.split_left_right_at_fraction(0.5);
+                disc = square(left.shrink(4.0));
+                let other = square(right.shrink(4.0));
+                part(ui, truth, disc, disc.left(), disc.right());
+                part(ui, &shown.mean, other, other.left(), other.right());
+                caption(pos2(disc.center().x, top), egui::Align2::CENTER_TOP, "Truth");
+                caption(pos2(other.center().x, top), egui::Align2::CENTER_TOP, "Prediction");
+            }
+            (SphereShown::Difference, _) => {
+                let image = shown.difference.as_ref().unwrap_or(&shown.mean);
+                part(ui, image, disc, disc.left(), disc.right());
+                caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "1 - prediction / truth");
+            }
+            (SphereShown::Sigma, _) if shown.sigma.is_some() => {
+                let image = shown.sigma.as_ref().unwrap_or(&shown.mean);
+                part(ui, image, disc, disc.left(), disc.right());
+                caption(
+                    pos2(area.left() + 12.0, top),
+                    egui::Align2::LEFT_TOP,
+                    "Sigma, averaged over the light",
+                );
+            }
+            _ => {
+                part(ui, &shown.mean, disc, disc.left(), disc.right());
+                caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "Prediction");
+            }
+        }
+        footer_ui(ui, area, shown, mode);
+        self.sphere_drag(ui, &response, disc);
+    }
+
+    fn sphere_drag(&mut self, ui: &Ui, response: &egui::Response, disc: Rect) {
+        let light = &mut self.settings.light;
+        if response.double_clicked() {
+            *light = SphereLight { point: light.point, ..SphereLight::default() };
+            self.settings.swipe = 0.5;
+        } else if response.dragged_by(egui::PointerButton::Primary)
+            && let Some(at) = response.interact_pointer_pos()
+        {
+            let x = (at.x - disc.center().x) / (0.5 * disc.width());
+            let y = (disc.center().y - at.y) / (0.5 * disc.height());
+            if ui.input(|i| i.modifiers.shift) {
+                self.settings.swipe = (0.5 + 0.5 * x).clamp(0.0, 1.0);
+            } else if light.point {
+                let scale = x.hypot(y).max(1.0);
+                light.at = [f64::from(x / scale), f64::from(y / scale)];
+            } else {
+                light.yaw += f64::from(response.drag_delta().x) * 0.01;
+                light.pitch += f64::from(response.drag_delta().y) * 0.01;
+            }
+        }
+    }
+
+    fn light_ui(&mut self, ui: &mut Ui) {
+        let light = &mut self.settings.light;
+        ui.radio_value(&mut light.point, false, format!("Environment: {}", self.environment.1));
+        ui.radio_value(&mut light.point, true, "Point light");
+        let number = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops");
+        number.row_ui(ui, &mut light.exposure);
+        let mut swipe = f64::from(self.settings.swipe);
+        let number = Number::new("Swipe", 0.0..=1.0, 0.5, "Where truth ends and prediction begins");
+        if number.row_ui(ui, &mut swipe) {
+            self.settings.swipe = super::widgets::narrow(swipe);
+        }
+        ui.separator();
+        if ui.button("Environment map…").clicked() {
+            self.ask_where(Purpose::Environment, "");
+            ui.close();
+        }
+        let studio = ui.button("Built-in studio");
+        if studio.clicked() && !reset(ui, &studio) {
+            let map = std::sync::Arc::new(gpbrdf_core::Environment::studio());
+            self.environment = (self.environment.0 + 1, "Studio (built in)".to_owned(), map);
+        }
+    }
+}
+
+/// What can be shown without a truth.
+fn only(mode: SphereShown) -> SphereShown {
+    if mode == SphereShown::Sigma { mode } else { SphereShown::Swipe }
+}
+
+/// The largest square in the middle of a rectangle.
+fn square(rect: Rect) -> Rect {
+    Rect::from_center_size(rect.center(), egui::Vec2::splat(rect.size().min_elem().max(1.0)))
+}
+
+/// The part of a picture between two vertical lines.
+fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, left: f32, right: f32) {
+    if right <= left {
+        return;
+    }
+    let u = |x: f32| (x - rect.left()) / rect.width();
+    let uv = Rect::from_min_max(pos2(u(left), 0.0), pos2(u(right), 1.0));
+    let area = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
+    ui.painter().image(texture.id(), area, uv, Color32::WHITE);
+}
+
+fn footer_ui(ui: &mut Ui, area: Rect, shown: &ShownSpheres, mode: SphereShown) {
+    let rect = Rect::from_min_max(pos2(area.left() + 12.0, area.bottom() - 28.0), area.max - vec2(12.0, 4.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(rect).id_salt("sphere footer"), |ui| {
+        ui.horizontal_centered(|ui| {
+            let images = &shown.images;
+            let scale = match mode {
+                SphereShown::Difference => {
+                    images.difference.as_ref().map(|d| (Colormap::Diverging, -d.1, d.1))
+                }
+                SphereShown::Sigma => images.sigma.as_ref().map(|s| (Colormap::Sequential, 0.0, s.1)),
+                _ => None,
+            };
+            if let Some((map, low, high)) = scale {
+                ui.label(short(low));
+                scale_ui(ui, map);
+                ui.label(short(high));
+                ui.add_space(12.0);
+            }
+            if let (Some(psnr), Some(ssim)) = (images.psnr, images.ssim) {
+                ui.label(RichText::new(format!("PSNR {:.1} dB", psnr)).strong());
+                ui.label(format!("SSIM {ssim:.4}"));
+            }
+            if !images.fine {
+                ui.weak("refining");
+            }
+        });
+    });
+}

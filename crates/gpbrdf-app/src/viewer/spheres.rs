@@ -1,0 +1,252 @@
+//! Lit spheres of truth, prediction, difference and sigma in colour, coarse first, made off the window's thread.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use eframe::egui::{Color32, ColorImage};
+use gpbrdf_core::{
+    BrdfTable, Colormap, DistantLight, ENV_PATCHES, Environment, Image, ImageMetrics, POINT_LIGHT,
+    SPHERE_SIZE, direction, environment_lights, exposure_of, psnr, render_sphere, ssim,
+};
+use serde::{Deserialize, Serialize};
+
+use super::document::DocumentId;
+use super::fitter::{Event, Outbox};
+use super::mailbox::{Mailbox, Sender};
+use super::slices::{colour, round_limit, shown};
+
+/// Pixels along each side, at first and at last.
+const COARSE: usize = 96;
+const FINE: usize = 320;
+/// Lights that stand for an environment at first.
+const COARSE_PATCHES: (usize, usize) = (24, 12);
+
+/// What lights the sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct SphereLight {
+    /// A point light in place of the environment.
+    pub(crate) point: bool,
+    /// Where the point light stands over the disc, `x` right and `y` up.
+    pub(crate) at: [f64; 2],
+    /// How far the environment is turned about the vertical and the horizontal axis, radians.
+    pub(crate) yaw: f64,
+    pub(crate) pitch: f64,
+    /// Stops.
+    pub(crate) exposure: f64,
+}
+
+impl Default for SphereLight {
+    fn default() -> Self {
+        Self { point: false, at: [-0.45, 0.5], yaw: 0.0, pitch: 0.0, exposure: 0.0 }
+    }
+}
+
+impl SphereLight {
+    fn lights(&self, environment: &Environment, patches: (usize, usize)) -> Vec<DistantLight> {
+        if self.point {
+            let [x, y] = self.at;
+            return vec![point_light(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())];
+        }
+        let mut lights = environment_lights(environment, patches);
+        let (sy, cy) = self.yaw.sin_cos();
+        let (sp, cp) = self.pitch.sin_cos();
+        for light in &mut lights {
+            let d = &mut light.direction;
+            (d.x, d.z) = (cy * d.x + sy * d.z, cy * d.z - sy * d.x);
+            (d.y, d.z) = (cp * d.y - sp * d.z, cp * d.z + sp * d.y);
+        }
+        lights
+    }
+}
+
+/// White light of irradiance pi from a direction.
+fn point_light(x: f64, y: f64, z: f64) -> DistantLight {
+    let towards = direction(x.hypot(y).atan2(z), y.atan2(x));
+    DistantLight { direction: towards, irradiance: [std::f64::consts::PI; 3] }
+}
+
+/// What spheres depend on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SphereKey {
+    pub(crate) document: DocumentId,
+    pub(crate) version: u64,
+    pub(crate) light: SphereLight,
+    pub(crate) environment: u64,
+    pub(crate) has_truth: bool,
+    pub(crate) has_sigma: bool,
+}
+
+/// Spheres to make.
+#[derive(Clone, Debug)]
+pub(crate) struct SphereRequest {
+    pub(crate) key: SphereKey,
+    pub(crate) truth: Option<Arc<BrdfTable>>,
+    pub(crate) mean: Arc<BrdfTable>,
+    pub(crate) sigma: Option<Arc<BrdfTable>>,
+    pub(crate) environment: Arc<Environment>,
+    /// Whether the metrics of pictures are still to be found.
+    pub(crate) wants_metrics: bool,
+}
+
+/// Spheres in colour.
+#[derive(Clone, Debug)]
+pub(crate) struct SphereImages {
+    pub(crate) key: SphereKey,
+    /// Whether no finer ones follow.
+    pub(crate) fine: bool,
+    pub(crate) truth: Option<ColorImage>,
+    pub(crate) mean: ColorImage,
+    /// `1 - b / a` with its scale.
+    pub(crate) difference: Option<(ColorImage, f64)>,
+    /// Mean of sigma over the light that a pixel sees, with its scale.
+    pub(crate) sigma: Option<(ColorImage, f64)>,
+    pub(crate) psnr: Option<f64>,
+    pub(crate) ssim: Option<f64>,
+    /// Linear pictures, for files.
+    pub(crate) linear: Vec<(&'static str, Image)>,
+}
+
+/// A truth's pictures, kept while light and size stay.
+type Kept = Option<((DocumentId, SphereLight, u64, usize), Image)>;
+
+/// Starts the thread that renders; it lets the fitter go first.
+pub(crate) fn spawn(
+    outbox: Outbox,
+    busy: impl Fn() -> bool + Send + Sync + 'static,
+) -> std::io::Result<Sender<SphereRequest>> {
+    let mut kept: [Kept; 2] = [None, None];
+    Mailbox::spawn("spheres", move |request: SphereRequest, stale| {
+        for (i, (size, patches)) in [(COARSE, COARSE_PATCHES), (FINE, ENV_PATCHES)].into_iter().enumerate() {
+            while i > 0 && busy() {
+                if stale() {
+                    return;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            let Some(images) = make(&request, size, patches, &mut kept[i], stale) else { return };
+            outbox.send(Event::Spheres(Box::new(images)));
+        }
+        if let Some(images) = request.wants_metrics.then(|| metrics(&request, stale)).flatten() {
+            let (document, version) = (request.key.document, request.key.version);
+            outbox.send(Event::Images { document, version, images: Box::new(images) });
+        }
+    })
+}
+
+type Stale<'a> = &'a (dyn Fn() -> bool + Sync);
+
+fn make(
+    request: &SphereRequest,
+    size: usize,
+    patches: (usize, usize),
+    kept: &mut Kept,
+    stale: Stale<'_>,
+) -> Option<SphereImages> {
+    let key = request.key;
+    let lights = key.light.lights(&request.environment, patches);
+    let kept_key = (key.document, key.light, key.environment, size);
+    let known = kept.as_ref().filter(|(k, _)| *k == kept_key).map(|(_, image)| image.clone());
+    let mut tables = vec![request.mean.as_ref()];
+    if let (None, Some(truth)) = (&known, &request.truth) {
+        tables.push(truth);
+    }
+    let mut images = render_sphere(&tables, &lights, size, stale)?;
+    let truth = known.or_else(|| if images.len() > 1 { images.pop() } else { None });
+    let truth = truth.filter(|_| request.truth.is_some());
+    let mean = images.pop()?;
+    if let Some(truth) = &truth {
+        *kept = Some((kept_key, truth.clone()));
+    }
+    let exposure = exposure_of(truth.as_ref().unwrap_or(&mean));
+    let scale = exposure * key.light.exposure.exp2();
+    let plain = |image: &Image| {
+        disc(image, |i| {
+            let [r, g, b] = image.pixels()[i].map(|x| shown(f64::from(x) * scale, 2.2));
+            Color32::from_rgb(r, g, b)
+        })
+    };
+    let difference = truth.as_ref().map(|truth| difference(truth, &mean));
+    let sigma = request.sigma.as_ref().and_then(|table| sigma_sphere(table, &lights, stale));
+    let (psnr, ssim) = match &truth {
+        Some(truth) => (psnr(truth, &mean, exposure).ok(), ssim(truth, &mean, exposure).ok()),
+        None => (None, None),
+    };
+    Some(SphereImages {
+        key,
+        fine: size == FINE,
+        truth: truth.as_ref().map(plain),
+        mean: plain(&mean),
+        difference,
+        sigma,
+        psnr,
+        ssim,
+        linear: truth.map(|t| ("truth", t)).into_iter().chain([("prediction", mean)]).collect(),
+    })
+}
+
+/// `1 - b / a`, averaged over R, G and B, in colour.
+fn difference(truth: &Image, mean: &Image) -> (ColorImage, f64) {
+    let gap: Vec<f64> = std::iter::zip(truth.pixels(), mean.pixels())
+        .map(|(a, b)| {
+            let ratio = |c: usize| {
+                if a[c] > 0.0 { 1.0 - f64::from(b[c]) / f64::from(a[c]) } else { 0.0 }
+            };
+            (ratio(0) + ratio(1) + ratio(2)) / 3.0
+        })
+        .collect();
+    let limit = round_limit(&gap, truth.mask());
+    (disc(truth, |i| colour(Colormap::Diverging, 0.5 + 0.5 * gap[i] / limit)), limit)
+}
+
+/// Sigma averaged over the light that each pixel sees.
+fn sigma_sphere(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> Option<(ColorImage, f64)> {
+    let white: Vec<_> =
+        lights.iter().map(|l| DistantLight { irradiance: [l.irradiance[1]; 3], ..*l }).collect();
+    let image = render_sphere(&[table], &white, COARSE, stale)?.pop()?;
+    let total = |i: usize| {
+        let center = |k: usize| 2.0 * (k as f64 + 0.5) / COARSE as f64 - 1.0;
+        let (x, y) = (center(i % COARSE), -center(i / COARSE));
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+        let cosine = |l: &DistantLight| l.direction.x * x + l.direction.y * y + l.direction.z * z;
+        let lit = white.iter().map(|l| (cosine(l), l.irradiance[0]));
+        lit.filter(|(cosine, _)| *cosine >= gpbrdf_core::MIN_COSINE).map(|(c, e)| c * e).sum::<f64>()
+    };
+    let values: Vec<f64> = (0..COARSE * COARSE)
+        .map(|i| {
+            let sum = total(i);
+            if image.mask()[i] && sum > 0.0 { f64::from(image.pixels()[i][0]) / sum } else { f64::NAN }
+        })
+        .collect();
+    let limit = round_limit(&values, image.mask());
+    Some((disc(&image, |i| colour(Colormap::Sequential, values[i] / limit)), limit))
+}
+
+/// A sphere picture with a soft rim.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 255")]
+fn disc(image: &Image, colour: impl Fn(usize) -> Color32) -> ColorImage {
+    let (width, height) = (image.width(), image.height());
+    let pixels = (0..width * height)
+        .map(|i| {
+            if !image.mask()[i] {
+                return Color32::TRANSPARENT;
+            }
+            let x = 2.0 * ((i % width) as f64 + 0.5) / width as f64 - 1.0;
+            let y = 2.0 * ((i / width) as f64 + 0.5) / height as f64 - 1.0;
+            let coverage = (0.5 + (1.0 - x.hypot(y)) * 0.5 * width as f64).clamp(0.0, 1.0);
+            let [r, g, b, _] = colour(i).to_array();
+            Color32::from_rgba_unmultiplied(r, g, b, (255.0 * coverage) as u8)
+        })
+        .collect();
+    ColorImage::new([width, height], pixels)
+}
+
+/// The metrics of pictures, as the command line reports them.
+fn metrics(request: &SphereRequest, stale: Stale<'_>) -> Option<ImageMetrics> {
+    let tables = [request.truth.as_ref()?.as_ref(), request.mean.as_ref()];
+    let studio = Environment::studio();
+    let env = render_sphere(&tables, &environment_lights(&studio, ENV_PATCHES), SPHERE_SIZE, stale)?;
+    let [x, y, z] = POINT_LIGHT;
+    let point = render_sphere(&tables, &[point_light(x, y, z)], SPHERE_SIZE, stale)?;
+    ImageMetrics::new((env.first()?, env.get(1)?), (point.first()?, point.get(1)?)).ok()
+}
