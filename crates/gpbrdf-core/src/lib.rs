@@ -76,7 +76,7 @@ pub use analytic::{
 };
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
-pub use bake::{SigmaTable, bake_mean, bake_sigma};
+pub use bake::{AxisBasis, SeparableForm, SigmaTable, TableGeometry, bake_mean, bake_sigma};
 pub use brdf::{Brdf, Reciprocal, Rgb};
 pub use colormap::Colormap;
 pub use environment::{EnvDirection, Environment};

@@ -1,7 +1,12 @@
 //! From a model to a whole table of mean and sigma.
 
 mod dense;
+mod geometry;
 mod lattice;
+mod separable;
+
+pub use geometry::TableGeometry;
+pub use separable::{AxisBasis, SeparableForm};
 
 use rayon::prelude::*;
 

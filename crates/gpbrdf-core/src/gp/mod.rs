@@ -12,6 +12,7 @@ pub(crate) mod optimize;
 pub use cost::{DenseCost, dense_cost};
 pub use dense::{DenseEvaluator, DenseGp, DenseLikelihood, LeaveOneOut};
 pub use dense_fit::fit_dense;
+pub(crate) use kronecker::apply as contract;
 pub use lattice::{LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood};
 pub use lattice_fit::{FitReport, Noise, fit_lattice};
 pub use optimize::{OptimizeOptions, Optimum, Parameter, maximize};
