@@ -196,11 +196,49 @@ impl Context {
         })
     }
 
+    /// Binds `resources` to group 0 of a pipeline, in the order of their bindings.
+    pub(crate) fn bind_group<const N: usize>(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        resources: [wgpu::BindingResource<'_>; N],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    }
+
+    /// Submits one dispatch.
+    pub(crate) fn dispatch(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        count: [u32; 3],
+    ) {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.dispatch_workgroups(count[0], count[1], count[2]);
+        drop(pass);
+        self.queue.submit([encoder.finish()]);
+    }
+
     /// A buffer that holds `bytes`, padded with zeros to at least 16 and a multiple of 4.
     ///
     /// # Errors
     /// [`Error::Limit`] over the device's largest binding, and those of [`Context::guard`].
-    pub fn buffer_of(&self, label: &'static str, bytes: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+    pub fn buffer_of(
+        &self,
+        label: &'static str,
+        bytes: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
         let buffer = self.empty_buffer(label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
         let whole = bytes.len() / 4 * 4;
         self.queue.write_buffer(&buffer, 0, &bytes[..whole]);
@@ -216,7 +254,12 @@ impl Context {
     ///
     /// # Errors
     /// As [`Context::buffer_of`].
-    pub fn empty_buffer(&self, label: &'static str, size: u64, usage: wgpu::BufferUsages) -> Result<wgpu::Buffer> {
+    pub fn empty_buffer(
+        &self,
+        label: &'static str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
         let limits = self.device.limits();
         let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
         if size > largest {
