@@ -213,6 +213,23 @@ impl Context {
         })
     }
 
+    /// Binds buffers to the given bindings of group 0 of a pipeline.
+    pub(crate) fn bind_buffers(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        buffers: &[(u32, &wgpu::Buffer)],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = buffers
+            .iter()
+            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    }
+
     /// Submits one dispatch.
     pub(crate) fn dispatch(
         &self,
@@ -248,6 +265,14 @@ impl Context {
             self.queue.write_buffer(&buffer, whole as u64, &last);
         }
         Ok(buffer)
+    }
+
+    /// A uniform buffer that holds `value`.
+    ///
+    /// # Errors
+    /// As [`Context::buffer_of`].
+    pub(crate) fn uniform(&self, value: &impl bytemuck::NoUninit) -> Result<wgpu::Buffer> {
+        self.buffer_of("uniforms", bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
     /// A buffer of zeros, of at least 16 bytes.
