@@ -109,7 +109,9 @@ pub use samples::{Sample, Samples};
 pub use slice::{Slice, SliceOptions};
 pub use source::{Content, Source};
 pub use space::InputSpace;
-pub use sphere::{ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, render_env, render_point};
+pub use sphere::{
+    ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, ShadingFrame, render_env, render_point,
+};
 pub use table::{
     BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, Trilinear, cell_center, cell_index, cell_indices,
 };
