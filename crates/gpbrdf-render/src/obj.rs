@@ -104,7 +104,7 @@ mod tests {
     fn broken_files_are_refused_by_name() {
         for (text, part) in [
             (&b"v 0 0 0\nf 1 2 3\n"[..], "out of bounds"),
-            (b"v 0 0\n", "position parse error"),
+            (b"v 0 0 x\n", "position parse error"),
             (b"hello\n", "found"),
             (b"", "expected faces, found none in 0 objects"),
             (b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite positions"),

@@ -9,6 +9,7 @@ mod input;
 mod materials;
 mod model_args;
 mod predict;
+mod render;
 mod report;
 mod slice;
 mod terminal;
@@ -48,6 +49,8 @@ enum Command {
     Eval(eval::Eval),
     /// A picture of a BRDF at one phi_d.
     Slice(slice::SliceCommand),
+    /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
+    Render(Box<render::Render>),
     /// Write any source as .binary, .exr or .csv.
     Convert(convert::Convert),
     /// What a file or a built-in material is.
@@ -79,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
+        Command::Render(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),
