@@ -11,5 +11,6 @@ mod cli {
     mod measured;
     mod odd_input;
     mod process;
+    mod render;
     mod usage;
 }

@@ -81,23 +81,23 @@ impl Mesh {
     }
 
     /// A tube of constant radius about the (2, 3) torus knot
-    /// `((2 + cos 3t) cos 2t, (2 + cos 3t) sin 2t, 1.2 sin 3t)`, with exact normals, in the unit sphere.
+    /// `((2 + cos 3t) cos 2t, (2 + cos 3t) sin 2t, 0.95 sin 3t)`, with exact normals, in the unit sphere.
     /// 49,152 triangles.
     #[must_use]
     pub fn knot() -> Self {
         const ALONG: u16 = 512;
         const AROUND: u16 = 48;
-        const RADIUS: f32 = 0.62;
+        const RADIUS: f32 = 0.55;
         let curve = |t: f32| {
             let (s3, c3) = (3.0 * t).sin_cos();
             let (s2, c2) = (2.0 * t).sin_cos();
-            vec3((2.0 + c3) * c2, (2.0 + c3) * s2, 1.2 * s3)
+            vec3((2.0 + c3) * c2, (2.0 + c3) * s2, 0.95 * s3)
         };
         let tangent = |t: f32| {
             let (s3, c3) = (3.0 * t).sin_cos();
             let (s2, c2) = (2.0 * t).sin_cos();
             let wide = 2.0 + c3;
-            vec3(-3.0 * s3 * c2 - 2.0 * wide * s2, -3.0 * s3 * s2 + 2.0 * wide * c2, 3.6 * c3).normalize()
+            vec3(-3.0 * s3 * c2 - 2.0 * wide * s2, -3.0 * s3 * s2 + 2.0 * wide * c2, 2.85 * c3).normalize()
         };
         let mut mesh = Self::default();
         for i in 0..ALONG {

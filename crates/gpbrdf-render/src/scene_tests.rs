@@ -63,7 +63,7 @@ fn the_sphere_under_a_point_light_is_the_core_s() {
     assert_eq!(mask, expected[0].mask());
     for (found, expected) in [&found.truth, &found.prediction].into_iter().zip(&expected) {
         let (worst, rms) = gaps(found, widened(expected.pixels()).iter(), 1.0);
-        println!("sphere, point light: worst {worst:.1e}, rms {rms:.1e}");
+        eprintln!("sphere, point light: worst {worst:.1e}, rms {rms:.1e}");
         assert!(worst < 2e-3, "{worst}");
     }
     // The texture unit's weights are coarser.
@@ -100,7 +100,7 @@ fn meshes_under_direct_light_are_the_twin_s() {
             }
             let expected = shade_on_cpu(&texels, &camera, TwinLight::Direct(light), &[&table], 0.0).remove(0);
             let (worst, rms) = gaps(&found.prediction, expected.iter(), 1.0);
-            println!("mesh: worst {worst:.1e}, rms {rms:.1e}");
+            eprintln!("mesh: worst {worst:.1e}, rms {rms:.1e}");
             assert!(worst < 2e-3, "{worst}");
         }
     }
@@ -144,7 +144,7 @@ fn the_three_strategies_agree_with_quadrature() {
     for (sampling, limit) in [(Sampling::Light, 0.01), (Sampling::Brdf, 0.02), (Sampling::Both, 0.008)] {
         let found = environment_picture(context, &mut renderer, sampling, 1024);
         let (worst, rms) = gaps(&found.prediction, fine.iter(), 1.0);
-        println!("{sampling:?}: worst {worst:.1e}, rms {rms:.1e}");
+        eprintln!("{sampling:?}: worst {worst:.1e}, rms {rms:.1e}");
         assert!(rms < limit, "{sampling:?}: worst {worst:e}, rms {rms:e}");
         // No bias: the mean of all pixels is far better than each.
         let mean = |pixels: &[[f64; 3]]| pixels.iter().flatten().sum::<f64>();
@@ -174,7 +174,7 @@ fn a_white_furnace_returns_one() {
         let values: Vec<f32> = inside.map(|(p, _)| p[0]).collect();
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         let worst = values.iter().map(|x| (x - 1.0).abs()).fold(0.0, f32::max);
-        println!("furnace, {sampling:?}: mean {mean:.5}, worst {worst:.1e}");
+        eprintln!("furnace, {sampling:?}: mean {mean:.5}, worst {worst:.1e}");
         assert!((mean - 1.0).abs() < 2e-3 && worst < 0.05, "{sampling:?}: {mean} {worst}");
     }
 }
@@ -258,7 +258,7 @@ fn compare_with_golden(name: &str, size: [u32; 2], found: &[[u8; 4]]) {
     let gaps: Vec<u8> = golden.iter().zip(found.as_flattened()).map(|(a, b)| a.abs_diff(*b)).collect();
     let mean = gaps.iter().map(|&g| f64::from(g)).sum::<f64>() / gaps.len() as f64;
     let worst = gaps.iter().max().unwrap();
-    println!("{name}: mean error {mean:.3}, largest {worst}");
+    eprintln!("{name}: mean error {mean:.3}, largest {worst}");
     // Edges may fall to either side of a pixel on another device.
     assert!(mean < 0.5 && gaps.iter().filter(|&&g| g > 8).count() < gaps.len() / 100, "{mean} {worst}");
 }

@@ -263,7 +263,7 @@ impl Render {
     fn scene(&self) -> Result<(Geometry, Camera)> {
         let (geometry, orbit) = match self.scene.to_str() {
             Some("sphere") => (Geometry::Sphere, [0.0, 0.0]),
-            Some("knot") => (Geometry::Mesh(Mesh::knot()), [-20.0, 15.0]),
+            Some("knot") => (Geometry::Mesh(Mesh::knot()), [8.0, -10.0]),
             Some("box") => (Geometry::Mesh(Mesh::rounded_box()), [-33.0, 28.0]),
             _ if self.scene.exists() => (Geometry::Mesh(read_obj(&self.scene)?), [0.0, 10.0]),
             _ => bail!(
@@ -380,7 +380,7 @@ impl Render {
             ShowName::Sigma | ShowName::Difference => {
                 let panel = self.panel(self.show, renderer, linear, display)?;
                 let note = if self.show == ShowName::Sigma {
-                    "sigma of the fitted target, weighted by reflected light"
+                    "weighted by reflected light"
                 } else {
                     "1 - prediction / truth, means of R, G, B"
                 };
