@@ -1,5 +1,6 @@
 //! Parse, run, print the chain of errors, and choose the exit code.
 
+mod backend;
 mod bake;
 mod convert;
 mod eval;
@@ -10,6 +11,7 @@ mod materials;
 mod model_args;
 mod predict;
 mod report;
+mod shader;
 mod slice;
 mod terminal;
 
@@ -50,6 +52,8 @@ enum Command {
     Slice(slice::SliceCommand),
     /// Write any source as .binary, .exr or .csv.
     Convert(convert::Convert),
+    /// The lookup of a baked texture as shader code for other renderers.
+    Shader(shader::Shader),
     /// What a file or a built-in material is.
     Info(info::Info),
     /// The built-in materials.
@@ -80,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
+        Command::Shader(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),
     };
