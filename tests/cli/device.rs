@@ -29,7 +29,7 @@ fn the_device_bakes_the_same_table() {
         let report = cli.json(&arguments);
         (
             report["backend"].as_str().unwrap().to_owned(),
-            read_merl(&cli.path(backend).join("table.binary")).unwrap(),
+            read_merl(cli.path(backend).join("table.binary").as_path()).unwrap(),
         )
     };
     let (name, cpu) = run("cpu");

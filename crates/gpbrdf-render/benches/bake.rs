@@ -24,7 +24,7 @@ fn bake(c: &mut Criterion) {
         Ok(context) => context,
         Err(error) => return eprintln!("skipped: {error}"),
     };
-    println!("on {}", context.describe());
+    eprintln!("on {}", context.describe());
     // A software device takes as long for 64 samples as a GPU for thousands.
     let dense_samples = if context.is_hardware() { 4096 } else { 64 };
     let lattice = model(&Layout::Lattice(LatticeLayout::default()), Solver::Lattice);

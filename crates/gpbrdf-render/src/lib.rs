@@ -5,6 +5,8 @@ mod bake;
 mod context;
 mod error;
 mod lookup;
+#[cfg(test)]
+mod reflect;
 mod texture;
 
 pub use bake::{Baker, Progress};
