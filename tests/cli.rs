@@ -8,6 +8,7 @@ mod cli {
     mod broken_files;
     mod commands;
     mod dense;
+    mod device;
     mod measured;
     mod odd_input;
     mod process;

@@ -4,7 +4,8 @@ use crate::harness::Cli;
 
 /// Whether a first small picture can be rendered here.
 fn has_adapter(cli: &Cli) -> bool {
-    let run = cli.run(&["render", "lambert", "--show", "truth", "--size", "8x8", "--spp", "1", "-o", "probe.png"]);
+    let run =
+        cli.run(&["render", "lambert", "--show", "truth", "--size", "8x8", "--spp", "1", "-o", "probe.png"]);
     if run.code == Some(0) {
         return true;
     }

@@ -16,6 +16,8 @@ mod mesh;
 mod obj;
 mod offscreen;
 #[cfg(test)]
+mod reflect;
+#[cfg(test)]
 mod scene_tests;
 mod shade;
 mod texture;

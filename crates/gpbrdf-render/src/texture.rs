@@ -4,7 +4,7 @@ use gpbrdf_core::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SigmaTable,
 use half::f16;
 
 use crate::context::Context;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// How a texture stores its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -169,14 +169,20 @@ impl BrdfTexture {
         Ok(out)
     }
 
-    /// [`BrdfTexture::download`] as a table, without sigma.
+    /// [`BrdfTexture::download`] as a table of the mean and one of sigma.
     ///
     /// # Errors
-    /// Those of [`BrdfTexture::download`], and texels that are not finite.
-    pub fn to_table(&self, context: &Context) -> Result<BrdfTable> {
-        let texels = self.download(context)?;
-        Ok(BrdfTable::from_values(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
-            .expect("a texture has as many texels as a table has cells"))
+    /// Those of [`BrdfTexture::download`].
+    pub fn to_tables(&self, context: &Context) -> Result<(BrdfTable, SigmaTable)> {
+        let (mean, sigma): (Vec<[f32; 3]>, Vec<f32>) =
+            self.download(context)?.into_iter().map(|[r, g, b, sigma]| ([r, g, b], sigma)).unzip();
+        let cells = mean.len();
+        let tables = BrdfTable::from_values(mean).zip(SigmaTable::from_planes(vec![sigma]));
+        tables.ok_or_else(|| Error::InvalidArgument {
+            what: "texels of a BRDF",
+            expected: N_CELLS.to_string(),
+            found: cells.to_string(),
+        })
     }
 
     /// What shaders bind.
@@ -229,7 +235,7 @@ mod tests {
         let Some(context) = test_context() else { return };
         let table = table();
         let single = BrdfTexture::upload(context, &table, None, Precision::Single).unwrap();
-        assert_eq!(single.to_table(context).unwrap(), table);
+        assert_eq!(single.to_tables(context).unwrap().0, table);
         let half = BrdfTexture::upload(context, &table, None, Precision::Half).unwrap();
         for (found, expected) in half.download(context).unwrap().iter().zip(table.values()) {
             assert!((0..3).all(|c| (found[c] / expected[c] - 1.0).abs() < 4.9e-4), "{found:?} {expected:?}");
@@ -243,7 +249,7 @@ mod tests {
         values[cell_index(3, 80, 7)] = [-1.0; 3];
         let torn = BrdfTable::from_values(values).unwrap();
         let found = BrdfTexture::upload(context, &torn, None, Precision::Single).unwrap();
-        let found = found.to_table(context).unwrap();
+        let found = found.to_tables(context).unwrap().0;
         assert_eq!(found.cell(3, 80, 7), torn.cell(3, 79, 7));
     }
 

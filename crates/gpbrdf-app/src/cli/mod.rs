@@ -1,5 +1,6 @@
 //! Parse, run, print the chain of errors, and choose the exit code.
 
+mod backend;
 mod bake;
 mod convert;
 mod eval;
@@ -11,6 +12,7 @@ mod model_args;
 mod predict;
 mod render;
 mod report;
+mod shader;
 mod slice;
 mod terminal;
 
@@ -53,6 +55,8 @@ enum Command {
     Render(Box<render::Render>),
     /// Write any source as .binary, .exr or .csv.
     Convert(convert::Convert),
+    /// The lookup of a baked texture as shader code for other renderers.
+    Shader(shader::Shader),
     /// What a file or a built-in material is.
     Info(info::Info),
     /// The built-in materials.
@@ -84,6 +88,7 @@ pub fn main() -> ExitCode {
         Command::Slice(command) => command.run(&terminal),
         Command::Render(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
+        Command::Shader(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),
     };

@@ -217,3 +217,18 @@ fn call(shape: Shape, r2: &str, parameter: &mut impl FnMut(f64) -> String) -> Re
         other => return Err(Error::NoShader { what: format!("the kernel {}", other.name()) }),
     })
 }
+
+/// The shader of a kernel with every shape.
+#[cfg(test)]
+pub(super) fn dense_wgsl_for_tests(double: bool) -> String {
+    let shapes = [
+        Shape::SquaredExponential,
+        Shape::RationalQuadratic { alpha: 1.0 },
+        Shape::Matern12,
+        Shape::Matern32,
+        Shape::Matern52,
+    ];
+    let mut kernel = Kernel::ard(1.0, shapes[0], &[1.0; 3]);
+    kernel.terms.extend(shapes[1..].iter().flat_map(|&shape| Kernel::ard(1.0, shape, &[1.0; 3]).terms));
+    dense_wgsl(&KernelSource::new(&kernel).unwrap(), double)
+}
