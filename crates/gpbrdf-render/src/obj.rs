@@ -106,7 +106,7 @@ mod tests {
             (&b"v 0 0 0\nf 1 2 3\n"[..], "out of bounds"),
             (b"v 0 0 x\n", "position parse error"),
             (b"hello\n", "found"),
-            (b"", "expected faces, found none in 0 objects"),
+            (b"", "expected faces, found none"),
             (b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "finite positions"),
             (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", "none in"),
             (b"\xff\xfe\x00", "OBJ"),
