@@ -8,8 +8,10 @@ mod cli {
     mod broken_files;
     mod commands;
     mod dense;
+    mod device;
     mod measured;
     mod odd_input;
     mod process;
+    mod render;
     mod usage;
 }

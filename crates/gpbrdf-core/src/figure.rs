@@ -28,17 +28,25 @@ const BAR: usize = 18;
 const Y_LABELS: usize = 104;
 
 /// One picture of a figure.
-struct Panel {
-    picture: Picture,
-    caption: &'static str,
-    scale: Option<Scale>,
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// The picture.
+    pub picture: Picture,
+    /// What is written above it.
+    pub caption: &'static str,
+    /// What its colours mean, where they are false ones: drawn as a bar beside it.
+    pub scale: Option<Scale>,
 }
 
 /// The meaning of a panel's colours.
-struct Scale {
-    map: Colormap,
-    low: f64,
-    high: f64,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// The colours.
+    pub map: Colormap,
+    /// The value of the lowest one.
+    pub low: f64,
+    /// The value of the highest one.
+    pub high: f64,
 }
 
 /// The axes of a slice.
@@ -136,6 +144,12 @@ pub fn sphere_figure(
         }
     }
     Ok(compose(&join(title, &shown), &panels, None, &note))
+}
+
+/// A figure of pictures in a row, with a title above, captions, colour bars and a note below.
+#[must_use]
+pub fn panel_figure(title: &str, panels: &[Panel], note: &str) -> Picture {
+    compose(title, panels, None, note)
 }
 
 impl Panel {
@@ -303,9 +317,10 @@ fn disc_by_index(image: &Image, colour: impl Fn(usize) -> Rgb8) -> Picture {
     })
 }
 
-/// 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in `mask`; at least
-/// 1e-6.
-fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
+/// The end of a colour scale: 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in
+/// `mask`; at least 1e-6.
+#[must_use]
+pub fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
     let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());
     let mut sizes: Vec<f64> = finite.map(|(x, _)| x.abs()).collect();
     sizes.sort_unstable_by(f64::total_cmp);

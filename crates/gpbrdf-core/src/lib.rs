@@ -77,13 +77,13 @@ pub use analytic::{
 };
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
-pub use bake::{SigmaTable, bake_mean, bake_sigma};
+pub use bake::{AxisBasis, SeparableForm, SigmaTable, TableGeometry, bake_mean, bake_sigma};
 pub use brdf::{Brdf, Reciprocal, Rgb};
 pub use colormap::Colormap;
 pub use condition::{Hyper, condition, fit_per_axis};
 pub use environment::{EnvDirection, Environment};
 pub use error::{Error, Result};
-pub use figure::{slice_figure, sphere_figure};
+pub use figure::{Panel, Scale, panel_figure, round_limit, slice_figure, sphere_figure};
 pub use fit::{FitOptions, Layout, SampleSet, Solver, detect_symmetry, fit};
 pub use formats::cornell::read_cornell;
 pub use formats::image_exr::write_image_exr;
@@ -106,14 +106,14 @@ pub use layout::{LatticeLayout, Symmetry, random_cells, random_directions};
 pub use materials::{Material, material, materials};
 pub use metrics::{CellMetrics, Interval, Metrics};
 pub use model::{IntervalOf, Model, Prediction, Process, Provenance, interval_95};
-pub use picture::{Picture, Rgb8};
+pub use picture::{Picture, Rgb8, write_rgba_png};
 pub use samples::{Sample, Samples};
 pub use slice::{Slice, SliceOptions};
 pub use source::{Content, Source};
 pub use space::InputSpace;
 pub use sphere::{
-    DistantLight, ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, environment_lights, render_env,
-    render_point, render_sphere,
+    DistantLight, ENV_PATCHES, Image, MIN_COSINE, POINT_LIGHT, SPHERE_SIZE, ShadingFrame, environment_lights,
+    render_env, render_point, render_sphere,
 };
 pub use table::{
     BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, Trilinear, cell_center, cell_index, cell_indices,

@@ -132,6 +132,27 @@ impl Picture {
     }
 }
 
+/// Writes `width x height` pixels of RGBA, rows from top to bottom, as PNG.
+///
+/// # Errors
+/// What `out` answers, or [`std::io::ErrorKind::Other`] unless there are `width x height` pixels, at least one.
+pub fn write_rgba_png(
+    out: &mut impl Write,
+    width: usize,
+    height: usize,
+    pixels: &[[u8; 4]],
+) -> std::io::Result<()> {
+    if pixels.is_empty() || width.checked_mul(height) != Some(pixels.len()) {
+        let what = format!("expected {width} x {height} pixels, at least one, found {}", pixels.len());
+        return Err(std::io::Error::other(what));
+    }
+    let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
+    image::codecs::png::PngEncoder::new(&mut *out)
+        .write_image(pixels.as_flattened(), side(width)?, side(height)?, image::ExtendedColorType::Rgba8)
+        .map_err(std::io::Error::other)?;
+    out.flush()
+}
+
 /// Linear RGB as shown: times `scale`, clipped to `[0, 1]`, raised to `1 / gamma`, rounded. NaN is black.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the value is within [0, 255.5]")]

@@ -147,7 +147,7 @@ pub fn render_sphere(
             let mut pixels = Vec::with_capacity(TILE * TILE);
             for row in top..(top + TILE).min(size) {
                 for column in left..(left + TILE).min(size) {
-                    let frame = Frame::new(center(column), -center(row));
+                    let frame = ShadingFrame::on_disc(center(column), -center(row));
                     pixels.extend(frame.map(|frame| (row * size + column, frame)));
                 }
             }
@@ -171,17 +171,35 @@ pub fn render_sphere(
     Some(images.collect())
 }
 
-/// The local frame of a pixel: `e` towards the projected viewer, so that `wo = (sin, 0, cos)`.
-struct Frame {
+/// The local frame of a point that is shaded: the normal is `+z`, and the viewer is in the plane of `x` and `z`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadingFrame {
+    /// Towards the projected viewer.
     e: Vector3<f64>,
     f: Vector3<f64>,
     normal: Vector3<f64>,
     wo: Vector3<f64>,
+    min_cosine: f64,
 }
 
-impl Frame {
-    /// The frame at `(x, y)` of the unit disc; none where the viewer sees black.
-    fn new(x: f64, y: f64) -> Option<Self> {
+impl ShadingFrame {
+    /// The frame of a surface with a unit normal, seen from the unit direction `to_viewer`. None where the cosine between
+    /// them is not positive or under `min_cosine`: the viewer sees black there.
+    #[must_use]
+    pub fn new(normal: &Vector3<f64>, to_viewer: &Vector3<f64>, min_cosine: f64) -> Option<Self> {
+        let cosine = normal.dot(to_viewer);
+        if !(cosine > 0.0) || cosine < min_cosine {
+            return None;
+        }
+        let across = to_viewer - cosine * normal;
+        let sine = across.norm();
+        let e = if sine > 0.0 { across / sine } else { any_perpendicular(normal) };
+        let wo = Vector3::new(sine, 0.0, cosine);
+        Some(Self { e, f: normal.cross(&e), normal: *normal, wo, min_cosine })
+    }
+
+    /// The frame at `(x, y)` of the unit disc, seen from `+z`; none where the viewer sees black.
+    fn on_disc(x: f64, y: f64) -> Option<Self> {
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
         if z < MIN_COSINE {
             return None;
@@ -189,31 +207,46 @@ impl Frame {
         let normal = Vector3::new(x, y, z);
         let sine = x.hypot(y);
         let e = if sine > 0.0 { Vector3::new(-x * z / sine, -y * z / sine, sine) } else { Vector3::x() };
-        Some(Self { e, f: normal.cross(&e), normal, wo: Vector3::new(sine, 0.0, z) })
+        let wo = Vector3::new(sine, 0.0, z);
+        Some(Self { e, f: normal.cross(&e), normal, wo, min_cosine: MIN_COSINE })
     }
+
+    /// Adds to `sums`, one for each table, the radiance `f(wi, wo) cos theta_i irradiance` that the point reflects to the
+    /// viewer of light from the unit direction `light`; `irradiance` is that of a surface that faces the light. `f` is
+    /// the trilinear lookup. Nothing is added where the cosine is not positive or under the frame's least one.
+    #[inline]
+    pub fn add_light(&self, tables: &[&BrdfTable], light: &Vector3<f64>, irradiance: Rgb, sums: &mut [Rgb]) {
+        let cosine = light.dot(&self.normal);
+        if !(cosine > 0.0) || cosine < self.min_cosine {
+            return;
+        }
+        let wi = Vector3::new(light.dot(&self.e), light.dot(&self.f), cosine);
+        let at = Trilinear::new(half_diff(&wi, &self.wo));
+        for (table, sum) in tables.iter().zip(sums) {
+            let value = table.lookup(&at);
+            for c in 0..3 {
+                sum[c] += irradiance[c] * cosine * f64::from(value[c]);
+            }
+        }
+    }
+}
+
+/// A unit vector at right angles to a unit vector.
+fn any_perpendicular(normal: &Vector3<f64>) -> Vector3<f64> {
+    let axis = if normal.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
+    (axis - axis.dot(normal) * normal).normalize()
 }
 
 /// Radiance of each pixel for each table. Light by light, since neighbouring pixels read neighbouring cells.
 fn shade(
     tables: &[&BrdfTable],
     lights: &[DistantLight],
-    pixels: &[(usize, Frame)],
+    pixels: &[(usize, ShadingFrame)],
 ) -> Vec<(usize, Vec<Rgb>)> {
     let mut radiance: Vec<_> = pixels.iter().map(|&(i, _)| (i, vec![[0.0; 3]; tables.len()])).collect();
     for light in lights {
         for ((_, frame), (_, sums)) in pixels.iter().zip(&mut radiance) {
-            let cosine = light.direction.dot(&frame.normal);
-            if cosine < MIN_COSINE {
-                continue;
-            }
-            let wi = Vector3::new(light.direction.dot(&frame.e), light.direction.dot(&frame.f), cosine);
-            let at = Trilinear::new(half_diff(&wi, &frame.wo));
-            for (table, sum) in tables.iter().zip(sums) {
-                let value = table.lookup(&at);
-                for c in 0..3 {
-                    sum[c] += light.irradiance[c] * cosine * f64::from(value[c]);
-                }
-            }
+            frame.add_light(tables, &light.direction, light.irradiance, sums);
         }
     }
     radiance

@@ -1,5 +1,6 @@
 //! The MERL-shaped table: 90 x 90 x 180 cells of RGB in half-difference angles.
 
+use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::Vector3;
@@ -140,6 +141,37 @@ impl BrdfTable {
         self.values[cell_index(i_theta_h, i_theta_d, i_phi_d)]
     }
 
+    /// The table without gaps: a cell without data takes the value of the nearest smaller `theta_d` that has some, else of
+    /// the nearest larger one, else zero.
+    #[must_use]
+    pub fn filled(&self) -> Cow<'_, Self> {
+        let missing = |value: &[f32; 3]| !value.iter().all(|&x| x >= 0.0);
+        if !self.values.iter().any(missing) {
+            return Cow::Borrowed(self);
+        }
+        let mut values = self.values.clone();
+        for h in 0..N_THETA_H {
+            for p in 0..N_PHI_D {
+                let along = |d: usize| cell_index(h, d, p);
+                for d in 1..N_THETA_D {
+                    if missing(&values[along(d)]) {
+                        values[along(d)] = values[along(d - 1)];
+                    }
+                }
+                for d in (0..N_THETA_D - 1).rev() {
+                    if missing(&values[along(d)]) {
+                        values[along(d)] = values[along(d + 1)];
+                    }
+                }
+                // Still missing only where the whole column is.
+                if missing(&values[along(0)]) {
+                    (0..N_THETA_D).for_each(|d| values[along(d)] = [0.0; 3]);
+                }
+            }
+        }
+        Cow::Owned(Self { values })
+    }
+
     /// Whether any of the cells of a lookup that count has data.
     fn has_data(&self, at: &Trilinear) -> bool {
         let data = |cell: u32| self.values[cell as usize].iter().all(|&x| x >= 0.0);
@@ -253,6 +285,12 @@ mod tests {
         assert_eq!(torn.lookup(&Trilinear::new(gap)), [0.0; 3]);
         let filled = torn.eval_half_diff(gap)[0];
         assert!((filled - cell_center(0, 44, 0).theta_d).abs() < 1e-6, "{filled}");
+        let whole = torn.filled();
+        assert_eq!(whole.cell(7, 89, 3), torn.cell(7, 44, 3));
+        assert_eq!(whole.cell(7, 10, 3), torn.cell(7, 10, 3));
+        assert!(matches!(whole.filled(), Cow::Borrowed(_)));
+        let empty = BrdfTable::from_fn(|_| [-1.0; 3]);
+        assert_eq!(empty.filled().cell(5, 5, 5), [0.0; 3]);
         let edge = cell_center(44, 10, 10);
         let half = HalfDiff { theta_h: edge.theta_h * 1.01, ..edge };
         assert!((table.eval_half_diff(half)[1] - 1.0).abs() < 1e-6);

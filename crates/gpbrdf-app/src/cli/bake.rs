@@ -6,11 +6,11 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::{
-    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, SigmaTable,
-    SliceOptions, Source, bake_mean, bake_sigma, render_env, slice_figure, sphere_figure, write_merl_to,
-    write_table_exr_to,
+    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, SliceOptions,
+    Source, render_env, slice_figure, sphere_figure, write_merl_to, write_table_exr_to,
 };
 
+use super::backend::{BackendArgs, Baked};
 use super::input::{OutputFolder, environment, open};
 use super::model_args::ModelArgs;
 use super::report::{Report, Seconds, cell_interval};
@@ -29,6 +29,8 @@ pub(crate) struct Bake {
     output: PathBuf,
     #[command(flatten)]
     model: ModelArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Environment map (.hdr or .exr, latitude-longitude) of the image metrics instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
@@ -46,12 +48,6 @@ pub(crate) struct Bake {
     json: bool,
 }
 
-/// Tables of a model.
-struct Baked {
-    mean: BrdfTable,
-    sigma: Option<SigmaTable>,
-}
-
 impl Bake {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let start = Instant::now();
@@ -60,17 +56,14 @@ impl Bake {
         let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
         let environment = environment(self.env.as_deref())?;
         let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
-        let mean = seconds.measure("bake_mean", || terminal.stage("baking the mean", || bake_mean(&model)));
-        let sigma = (!self.no_sigma)
-            .then(|| seconds.measure("bake_sigma", || terminal.stage("baking sigma", || bake_sigma(&model))));
-        let baked = Baked { mean, sigma };
+        let baked = self.backend.bake(&model, !self.no_sigma, &mut seconds, terminal)?;
         let compare = !(self.no_metrics && self.no_images);
         let truth = if compare {
             seconds.measure("metrics", || terminal.stage("tabulating the truth", || source.table()))
         } else {
             None
         };
-        let mut report = Report::new(&model, &fits, seconds);
+        let mut report = Report::new(&model, &fits, seconds, baked.backend.clone());
         if let (false, Some(truth)) = (self.no_metrics, &truth) {
             let begin = Instant::now();
             report.metrics =

@@ -35,7 +35,7 @@ impl Fit {
         // Before the fit: a model that cannot be written is not worth the wait.
         let mut file = AtomicFile::create(&self.output)?;
         let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
-        let mut report = Report::new(&model, &fits, seconds);
+        let mut report = Report::new(&model, &fits, seconds, "cpu".to_owned());
         report.outputs.push(self.output.display().to_string());
         let begin = Instant::now();
         file.write_all(&model.to_bytes()?)

@@ -1,5 +1,6 @@
 //! Parse, run, print the chain of errors, and choose the exit code.
 
+mod backend;
 mod bake;
 mod convert;
 mod eval;
@@ -9,7 +10,9 @@ mod input;
 mod materials;
 mod model_args;
 mod predict;
+mod render;
 mod report;
+mod shader;
 mod slice;
 mod terminal;
 
@@ -48,8 +51,12 @@ enum Command {
     Eval(eval::Eval),
     /// A picture of a BRDF at one phi_d.
     Slice(slice::SliceCommand),
+    /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
+    Render(Box<render::Render>),
     /// Write any source as .binary, .exr or .csv.
     Convert(convert::Convert),
+    /// The lookup of a baked texture as shader code for other renderers.
+    Shader(shader::Shader),
     /// What a file or a built-in material is.
     Info(info::Info),
     /// The built-in materials.
@@ -79,7 +86,9 @@ pub fn main() -> ExitCode {
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
+        Command::Render(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
+        Command::Shader(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),
     };

@@ -29,7 +29,7 @@ pub(crate) struct Report {
     pub(crate) converged: bool,
     pub(crate) at_bound: Vec<String>,
     pub(crate) seconds: Seconds,
-    pub(crate) backend: &'static str,
+    pub(crate) backend: String,
     pub(crate) metrics: Option<Metrics>,
     pub(crate) outputs: Vec<String>,
 }
@@ -67,7 +67,7 @@ impl Seconds {
 }
 
 impl Report {
-    pub(crate) fn new(model: &Model, fits: &[FitReport], seconds: Seconds) -> Self {
+    pub(crate) fn new(model: &Model, fits: &[FitReport], seconds: Seconds, backend: String) -> Self {
         let provenance = &model.provenance;
         let (solver, kernel, hyper) = describe(model);
         Self {
@@ -85,7 +85,7 @@ impl Report {
             converged: fits.iter().all(|f| f.converged),
             at_bound: fits.iter().flat_map(|f| f.at_bound.iter().cloned()).collect(),
             seconds,
-            backend: "cpu",
+            backend,
             metrics: None,
             outputs: Vec::new(),
         }
@@ -125,6 +125,9 @@ impl Report {
         }
         if let Some(m) = &self.metrics {
             lines.extend(metric_lines(m));
+        }
+        if self.backend != "cpu" {
+            lines.push(format!("  baked on {}", self.backend));
         }
         let run = STAGES.iter().filter(|stage| self.seconds.get(stage) > 0.0);
         let times: Vec<String> =

@@ -5,19 +5,17 @@
 //! depends on all three indices. A table takes `90 A B C + 90 180 B C` multiply-adds, `0.55 M B` kernel values, and
 //! for the variance `0.55 M B^2` more multiply-adds.
 
-use std::f64::consts::FRAC_PI_2;
-
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-use crate::angles::theta_d_max;
+use super::geometry::TableGeometry;
 use crate::gp::lattice::{LatticeGp, square};
 use crate::kernel::GridScratch;
 use crate::layout::Symmetry;
-use crate::simd::{exp_slice, vectorized};
+use crate::simd::vectorized;
 use crate::space::InputSpace;
-use crate::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
+use crate::table::{N_PHI_D, N_THETA_D};
 
 /// Distinct `|cos phi_d|` of the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
 const N_COLUMNS: usize = N_PHI_D / 2;
@@ -32,16 +30,16 @@ pub(super) fn bake_means<S: Send>(
     emit: impl Fn(&mut S, &[usize], &mut [f64]) + Sync,
 ) {
     let nodes: usize = gp.data().len();
-    let along_u = gp.cross(0, &u_coordinates(space));
-    let along_phi = gp.cross(2, &phi_coordinates(symmetry));
+    let geometry = TableGeometry::new(space);
+    let along_u = gp.cross(0, geometry.first());
+    let along_phi = gp.cross(2, geometry.third());
     let contracted: Vec<Mat<f64>> =
         gp.weights().chunks(nodes).map(|weights| contract_u(gp, weights, &along_u)).collect();
-    let exponent = v_exponent(space);
-    slabs.enumerate().for_each_init(Column::new, |column, (i, mut slab)| {
+    slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
         let weights: Vec<Mat<f64>> = contracted.iter().map(|m| contract_phi(gp, m, i, &along_phi)).collect();
         let mut means = vec![0.0; weights.len() * N_THETA_D];
         for j in 0..N_COLUMNS {
-            column.fill(gp, exponent, i, j);
+            column.fill(gp, &geometry, i, j);
             for (row, targets) in mirrored_rows(symmetry, j) {
                 column.sum_means(&weights, row, &mut means);
                 emit(&mut slab, &targets, &mut means);
@@ -58,21 +56,20 @@ pub(super) fn bake_variances<S: Send>(
     slabs: impl IndexedParallelIterator<Item = S>,
     emit: impl Fn(&mut S, &[usize], &[f64]) + Sync,
 ) {
-    let mut along_u = &gp.cross(0, &u_coordinates(space)) * &gp.eigen[0].vectors;
-    let phi = phi_coordinates(symmetry);
-    let mut along_phi = &gp.cross(2, &phi) * &gp.eigen[2].vectors;
+    let geometry = TableGeometry::new(space);
+    let mut along_u = &gp.cross(0, geometry.first()) * &gp.eigen[0].vectors;
+    let mut along_phi = &gp.cross(2, geometry.third()) * &gp.eigen[2].vectors;
     square(&mut along_u);
     square(&mut along_phi);
     let contracted = contract_u(gp, &gp.precision, &along_u);
     // Along u and v the prior variance is the same everywhere.
-    let priors: Vec<f64> = phi.iter().map(|&phi| gp.prior_variance([0.0, 0.0, phi])).collect();
+    let priors: Vec<f64> = geometry.third().iter().map(|&phi| gp.prior_variance([0.0, 0.0, phi])).collect();
     let scale = gp.hyper().signal_variance;
-    let exponent = v_exponent(space);
-    slabs.enumerate().for_each_init(Column::new, |column, (i, mut slab)| {
+    slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
         let weights = contract_phi(gp, &contracted, i, &along_phi);
         let mut variances = vec![0.0; N_THETA_D];
         for j in 0..N_COLUMNS {
-            column.fill(gp, exponent, i, j);
+            column.fill(gp, &geometry, i, j);
             column.project(&gp.eigen[1].vectors);
             for (row, targets) in mirrored_rows(symmetry, j) {
                 column.sum_variances(&weights, row, priors[row], scale, &mut variances);
@@ -80,25 +77,6 @@ pub(super) fn bake_variances<S: Send>(
             }
         }
     });
-}
-
-/// First kernel coordinate of the cells along `theta_h`.
-fn u_coordinates(space: InputSpace) -> Vec<f64> {
-    (0..N_THETA_H).map(|i| space.warp_u((i as f64 + 0.5) / N_THETA_H as f64)).collect()
-}
-
-/// The second kernel coordinate is `v` to this power.
-fn v_exponent(space: InputSpace) -> f64 {
-    match space {
-        InputSpace::WarpedBox { v_density, .. } => v_density.recip(),
-        InputSpace::HalfDiff => 1.0,
-    }
-}
-
-/// Third kernel coordinate of the cells along `phi_d`; a bilateral process is the same on both halves.
-fn phi_coordinates(symmetry: Symmetry) -> Vec<f64> {
-    let rows = if symmetry == Symmetry::Bilateral { N_COLUMNS } else { N_PHI_D };
-    (0..rows).map(|i| cell_center(0, 0, i).phi_d).collect()
 }
 
 /// Rows of the contracted weights that share the kernel values of column `j`, each with the `i_phi_d` it is for: one
@@ -128,9 +106,8 @@ fn contract_phi(gp: &LatticeGp, contracted: &Mat<f64>, i: usize, along_phi: &Mat
 }
 
 /// Kernel values along one column.
+#[derive(Default)]
 struct Column {
-    /// `ln theta_d` of the cells.
-    log_theta_d: Vec<f64>,
     /// Warped `v` of the cells above the horizon, then one 1 that stands for all others.
     v: Vec<f64>,
     /// `[node][cell]`.
@@ -141,29 +118,10 @@ struct Column {
 }
 
 impl Column {
-    fn new() -> Self {
-        let theta_d = |l: usize| (l as f64 + 0.5) / N_THETA_D as f64 * FRAC_PI_2;
-        Self {
-            log_theta_d: (0..N_THETA_D).map(|l| theta_d(l).ln()).collect(),
-            v: Vec::new(),
-            kernels: Vec::new(),
-            projected: Vec::new(),
-            scratch: GridScratch::default(),
-        }
-    }
-
     /// Takes the column of `i_theta_h = i` and `i_phi_d = j`.
-    fn fill(&mut self, gp: &LatticeGp, exponent: f64, i: usize, j: usize) {
-        let center = cell_center(i, 0, j);
-        let log_limit = theta_d_max(center.theta_h, center.phi_d).ln();
-        // v^exponent = (theta_d / theta_d_max)^exponent.
+    fn fill(&mut self, gp: &LatticeGp, geometry: &TableGeometry, i: usize, j: usize) {
         self.v.clear();
-        let above = self.log_theta_d.iter().take_while(|log_theta_d| **log_theta_d < log_limit);
-        self.v.extend(above.map(|log_theta_d| exponent * (log_theta_d - log_limit)));
-        exp_slice(&mut self.v);
-        if self.v.len() < N_THETA_D {
-            self.v.push(1.0);
-        }
+        self.v.extend(geometry.column(i, j));
         let nodes = &gp.data().coordinates[1];
         self.kernels.resize(nodes.len() * self.v.len(), 0.0);
         // The metric along v is the plain distance in every space.

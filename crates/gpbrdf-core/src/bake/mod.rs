@@ -1,7 +1,12 @@
 //! From a model to a whole table of mean and sigma.
 
 mod dense;
+mod geometry;
 mod lattice;
+mod separable;
+
+pub use geometry::TableGeometry;
+pub use separable::{AxisBasis, SeparableForm};
 
 use rayon::prelude::*;
 
@@ -17,6 +22,13 @@ pub struct SigmaTable {
 }
 
 impl SigmaTable {
+    /// One plane in MERL order for all channels, or three; `None` unless each has [`N_CELLS`] values.
+    #[must_use]
+    pub fn from_planes(planes: Vec<Vec<f32>>) -> Option<Self> {
+        let whole = planes.iter().all(|plane| plane.len() == N_CELLS);
+        (whole && matches!(planes.len(), 1 | 3)).then_some(Self { planes })
+    }
+
     /// One plane in MERL order where the channels share hyper-parameters, else one a channel.
     #[must_use]
     pub fn planes(&self) -> &[Vec<f32>] {

@@ -458,7 +458,12 @@ impl LatticeGp {
     /// `k(x, x)` without the signal variance, at kernel coordinates `x`.
     #[must_use]
     pub(crate) fn prior_variance(&self, x: [f64; 3]) -> f64 {
-        (0..3).map(|k| self.data.axis_variance(k, &self.hyper.kernels[k], x[k])).product()
+        (0..3).map(|k| self.axis_variance(k, x[k])).product()
+    }
+
+    /// `k(x, x)` of axis `k` at its coordinate `x`.
+    pub(crate) fn axis_variance(&self, k: usize, x: f64) -> f64 {
+        self.data.axis_variance(k, &self.hyper.kernels[k], x)
     }
 
     fn cross_rows(&self, points: &[[f64; 3]]) -> [Mat<f64>; 3] {

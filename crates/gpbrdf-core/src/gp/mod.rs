@@ -13,6 +13,7 @@ pub use cost::{DenseCost, dense_cost};
 pub use dense::{DenseEvaluator, DenseGp, DenseLikelihood, LeaveOneOut};
 pub use dense_fit::fit_dense;
 pub(crate) use dense_fit::fit_dense_until;
+pub(crate) use kronecker::apply as contract;
 pub use lattice::{LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood};
 pub(crate) use lattice_fit::fit_lattice_until;
 pub use lattice_fit::{FitReport, Noise, fit_lattice};

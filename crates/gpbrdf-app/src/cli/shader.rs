@@ -1,0 +1,63 @@
+//! `gpbrdf-cli shader`: the lookup of a baked texture for other renderers.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use gpbrdf_core::AtomicFile;
+use gpbrdf_render::{ShaderLanguage, translate};
+
+use super::terminal::Terminal;
+
+#[derive(Args, Debug)]
+pub(crate) struct Shader {
+    /// Shading language.
+    #[arg(long, value_enum, default_value = "wgsl")]
+    lang: Language,
+    /// File to write; standard output by default.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Language {
+    /// WebGPU.
+    Wgsl,
+    /// OpenGL 4.5.
+    Glsl,
+    /// DirectX, shader model 6.
+    Hlsl,
+    /// Metal.
+    Msl,
+    /// Vulkan, binary.
+    Spirv,
+}
+
+impl Shader {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let language = match self.lang {
+            Language::Wgsl => ShaderLanguage::Wgsl,
+            Language::Glsl => ShaderLanguage::Glsl,
+            Language::Hlsl => ShaderLanguage::Hlsl,
+            Language::Msl => ShaderLanguage::Msl,
+            Language::Spirv => ShaderLanguage::Spirv,
+        };
+        let binary = language == ShaderLanguage::Spirv;
+        let code = translate(language)?;
+        let Some(path) = &self.output else {
+            let mut out = std::io::stdout().lock();
+            if binary && out.is_terminal() {
+                bail!("SPIR-V is binary: expected --output FILE, found a terminal");
+            }
+            return out
+                .write_all(&code)
+                .and_then(|()| out.flush())
+                .context("cannot write to standard output");
+        };
+        let mut file = AtomicFile::create(path)?;
+        file.write_all(&code).with_context(|| format!("cannot write \"{}\"", path.display()))?;
+        file.commit()?;
+        terminal.summary(&format!("wrote {}", path.display()))
+    }
+}

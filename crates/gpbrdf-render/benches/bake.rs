@@ -1,0 +1,49 @@
+//! Baking on the device: a lattice model of 64 x 32 x 18 nodes and a dense model, RGB, each until the texture is written.
+#![allow(missing_docs, reason = "criterion's macros make public items")]
+
+use std::ops::ControlFlow;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use gpbrdf_core::{
+    FitOptions, InputSpace, LatticeLayout, Layout, Model, OptimizeOptions, Provenance, SampleSet, Solver,
+    Source, fit,
+};
+use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision};
+
+fn model(layout: &Layout, solver: Solver) -> Option<Model> {
+    let source = Source::built_in("cherry-235").ok()?;
+    let samples = SampleSet::measure(source.brdf()?, layout).ok()?;
+    let optimize = OptimizeOptions { max_iterations: 8, ..OptimizeOptions::default() };
+    let space: InputSpace = LatticeLayout::default().space();
+    let options = FitOptions { solver, optimize, space, ..FitOptions::default() };
+    Some(fit(&samples, &options, Provenance::default()).ok()?.0)
+}
+
+fn bake(c: &mut Criterion) {
+    let context = match Context::open(AdapterChoice::Any) {
+        Ok(context) => context,
+        Err(error) => return eprintln!("skipped: {error}"),
+    };
+    eprintln!("on {}", context.describe());
+    // A software device takes as long for 64 samples as a GPU for thousands.
+    let dense_samples = if context.is_hardware() { 4096 } else { 64 };
+    let lattice = model(&Layout::Lattice(LatticeLayout::default()), Solver::Lattice);
+    let dense = model(&Layout::Random { count: dense_samples, seed: 1 }, Solver::Dense);
+    let (Some(lattice), Some(dense), Ok(baker)) = (lattice, dense, Baker::new(&context)) else { return };
+    let Ok(texture) = BrdfTexture::empty(&context, Precision::Half) else { return };
+    let mut group = c.benchmark_group("bake");
+    group.sample_size(10);
+    let dense_name = format!("dense_{dense_samples}");
+    for (name, model) in [("lattice_36864", &lattice), (dense_name.as_str(), &dense)] {
+        group.bench_function(name, |b| {
+            b.iter(|| -> gpbrdf_render::Result<()> {
+                baker.bake_into(model, &texture, &mut |_| ControlFlow::Continue(()))?;
+                context.wait("bench")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, bake);
+criterion_main!(benches);

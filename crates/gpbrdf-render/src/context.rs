@@ -1,0 +1,403 @@
+//! The graphics device.
+
+use std::fmt;
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+use crate::error::{Error, Result};
+
+/// How long a piece of work may keep the device before it counts as stuck.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Which adapter to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// The fastest there is, a software one if there is no other.
+    #[default]
+    Any,
+    /// A GPU or none.
+    Hardware,
+}
+
+/// A graphics device and its queue: one of its own, or one that a window or another renderer has opened.
+///
+/// Only what is used is asked for, and only where it is there: filtering of 32-bit textures
+/// ([`Context::float32_filterable`]) and arithmetic in f64 ([`Context::f64_arithmetic`]).
+#[derive(Clone)]
+pub struct Context {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    /// Why the device is gone, once it is.
+    lost: Arc<OnceLock<String>>,
+}
+
+impl fmt::Debug for Context {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Context").field("adapter", &self.describe()).finish_non_exhaustive()
+    }
+}
+
+impl Context {
+    /// The features this crate makes use of where they are there.
+    pub const OPTIONAL_FEATURES: wgpu::Features =
+        wgpu::Features::FLOAT32_FILTERABLE.union(wgpu::Features::SHADER_F64);
+
+    /// The limits this crate asks of an adapter: those of modest devices, and of buffers and pictures what there is.
+    #[must_use]
+    pub fn required_limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
+        let there = adapter.limits();
+        wgpu::Limits {
+            max_buffer_size: there.max_buffer_size,
+            max_storage_buffer_binding_size: there.max_storage_buffer_binding_size,
+            max_storage_buffers_per_shader_stage: there.max_storage_buffers_per_shader_stage.min(8),
+            ..wgpu::Limits::downlevel_defaults().using_resolution(there)
+        }
+    }
+
+    /// Opens a device. The environment variables `WGPU_BACKEND` (`vulkan`, `metal`, `dx12`, `gl`) and
+    /// `WGPU_ADAPTER_NAME` (a part of the name) narrow the choice.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] where there is none, [`Error::Device`] where it does not open.
+    pub fn open(choice: AdapterChoice) -> Result<Self> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let adapter = choose(&instance, choice)?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("gpbrdf"),
+            required_features: adapter.features() & Self::OPTIONAL_FEATURES,
+            required_limits: Self::required_limits(&adapter),
+            ..Default::default()
+        }))
+        .map_err(|error| Error::Device { adapter: adapter.get_info().name, message: error.to_string() })?;
+        let context = Self::from_device(&adapter, device, queue);
+        let lost = context.lost.clone();
+        context.device.set_device_lost_callback(move |reason, message| {
+            let _first_reason_stays = lost.set(format!("{reason:?} {message}"));
+        });
+        Ok(context)
+    }
+
+    /// Works on a device that somebody else has opened on `adapter`; its features decide what is used. That
+    /// somebody also hears of its loss.
+    #[must_use]
+    pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self { device, queue, info: adapter.get_info(), lost: Arc::default() }
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Its queue.
+    #[must_use]
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
+    }
+
+    /// The adapter it is on.
+    #[must_use]
+    pub fn info(&self) -> &wgpu::AdapterInfo {
+        &self.info
+    }
+
+    /// The adapter for people: `llvmpipe (LLVM 15.0.6, 256 bits), Vulkan, software`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let kind = match self.info.device_type {
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Other => "of unknown kind",
+        };
+        format!("{}, {:?}, {kind}", self.info.name, self.info.backend)
+    }
+
+    /// Whether it is a GPU, not a program on the processor.
+    #[must_use]
+    pub fn is_hardware(&self) -> bool {
+        is_hardware(&self.info)
+    }
+
+    /// Whether textures of 32-bit floats can be filtered.
+    #[must_use]
+    pub fn float32_filterable(&self) -> bool {
+        self.device.features().contains(wgpu::Features::FLOAT32_FILTERABLE)
+    }
+
+    /// Whether shaders can compute in f64.
+    #[must_use]
+    pub fn f64_arithmetic(&self) -> bool {
+        self.device.features().contains(wgpu::Features::SHADER_F64)
+    }
+
+    /// Does `work` and answers with what the device had against it.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`], [`Error::Lost`], or [`Error::Gpu`] when the device rejects a part of it. `what` names
+    /// the work in the message.
+    pub fn guard<T>(&self, what: &str, work: impl FnOnce() -> T) -> Result<T> {
+        use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
+        let scopes = [Internal, OutOfMemory, Validation].map(|filter| self.device.push_error_scope(filter));
+        let result = work();
+        let mut first = None;
+        for scope in scopes.into_iter().rev() {
+            let error = pollster::block_on(scope.pop());
+            first = first.or(error);
+        }
+        self.check_lost(what)?;
+        match first {
+            None => Ok(result),
+            Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::OutOfMemory { what: what.to_owned() }),
+            Some(error) => Err(Error::Gpu { what: what.to_owned(), message: error.to_string() }),
+        }
+    }
+
+    fn check_lost(&self, what: &str) -> Result<()> {
+        match self.lost.get() {
+            Some(message) => {
+                Err(Error::Lost { what: what.to_owned(), message: message.trim_end().to_owned() })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Waits until everything submitted is done.
+    ///
+    /// # Errors
+    /// [`Error::Lost`] when the device is gone or takes over two minutes.
+    pub fn wait(&self, what: &str) -> Result<()> {
+        let done = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) });
+        self.check_lost(what)?;
+        done.map(drop).map_err(|error| Error::Lost { what: what.to_owned(), message: error.to_string() })
+    }
+
+    /// A pipeline out of WGSL, with the layout that the shader implies.
+    ///
+    /// # Errors
+    /// Those of [`Context::guard`].
+    pub fn compute_pipeline(&self, label: &str, source: &str, entry: &str) -> Result<wgpu::ComputePipeline> {
+        self.guard(label, || {
+            let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(label),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
+            });
+            self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(label),
+                layout: None,
+                module: &module,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        })
+    }
+
+    /// Binds `resources` to group 0 of a pipeline, in the order of their bindings.
+    pub(crate) fn bind_group<const N: usize>(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        resources: [wgpu::BindingResource<'_>; N],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    }
+
+    /// Binds buffers to the given bindings of group 0 of a pipeline.
+    pub(crate) fn bind_buffers(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        buffers: &[(u32, &wgpu::Buffer)],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = buffers
+            .iter()
+            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    }
+
+    /// Submits one dispatch.
+    pub(crate) fn dispatch(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        group: &wgpu::BindGroup,
+        count: [u32; 3],
+    ) {
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.dispatch_workgroups(count[0], count[1], count[2]);
+        drop(pass);
+        self.queue.submit([encoder.finish()]);
+    }
+
+    /// A buffer that holds `bytes`, padded with zeros to at least 16 and a multiple of 4.
+    ///
+    /// # Errors
+    /// [`Error::Limit`] over the device's largest binding, and those of [`Context::guard`].
+    pub fn buffer_of(
+        &self,
+        label: &'static str,
+        bytes: &[u8],
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        let buffer = self.empty_buffer(label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
+        let whole = bytes.len() / 4 * 4;
+        self.queue.write_buffer(&buffer, 0, &bytes[..whole]);
+        if whole < bytes.len() {
+            let mut last = [0; 4];
+            last[..bytes.len() - whole].copy_from_slice(&bytes[whole..]);
+            self.queue.write_buffer(&buffer, whole as u64, &last);
+        }
+        Ok(buffer)
+    }
+
+    /// A uniform buffer that holds `value`.
+    ///
+    /// # Errors
+    /// As [`Context::buffer_of`].
+    pub(crate) fn uniform(&self, value: &impl bytemuck::NoUninit) -> Result<wgpu::Buffer> {
+        self.buffer_of("uniforms", bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
+    }
+
+    /// A buffer of zeros, of at least 16 bytes.
+    ///
+    /// # Errors
+    /// As [`Context::buffer_of`].
+    pub fn empty_buffer(
+        &self,
+        label: &'static str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer> {
+        let limits = self.device.limits();
+        let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+        if size > largest {
+            return Err(Error::Limit {
+                what: label,
+                expected: format!("at most {largest} bytes"),
+                found: format!("{size} bytes"),
+            });
+        }
+        self.guard(label, || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size.max(16).next_multiple_of(4),
+                usage,
+                mapped_at_creation: false,
+            })
+        })
+    }
+
+    /// The contents of a buffer with the usage `COPY_SRC`. Waits for the device.
+    ///
+    /// # Errors
+    /// Those of [`Context::guard`].
+    pub fn read_buffer(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
+        const WHAT: &str = "reading back";
+        let size = buffer.size();
+        let staging = self.empty_buffer(
+            "read-back buffer",
+            size,
+            wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        )?;
+        self.guard(WHAT, || {
+            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
+            self.queue.submit([encoder.finish()]);
+        })?;
+        self.read_mapped(&staging)
+    }
+
+    /// The contents of a buffer with the usage `MAP_READ`, once everything submitted is done.
+    pub(crate) fn read_mapped(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>> {
+        const WHAT: &str = "reading back";
+        let failed = |message: String| Error::Gpu { what: WHAT.to_owned(), message };
+        let answer: Arc<OnceLock<_>> = Arc::default();
+        let set = answer.clone();
+        staging.map_async(wgpu::MapMode::Read, .., move |result| {
+            let _set_once = set.set(result);
+        });
+        self.wait(WHAT)?;
+        match answer.get() {
+            Some(Ok(())) => {}
+            Some(Err(error)) => return Err(failed(error.to_string())),
+            None => return Err(failed("the device did not answer".to_owned())),
+        }
+        let bytes = staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?.to_vec();
+        staging.unmap();
+        Ok(bytes)
+    }
+}
+
+fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
+    matches!(
+        info.device_type,
+        wgpu::DeviceType::DiscreteGpu | wgpu::DeviceType::IntegratedGpu | wgpu::DeviceType::VirtualGpu
+    )
+}
+
+/// The best adapter with compute shaders: discrete before integrated before virtual before software, and Vulkan,
+/// Metal and DX12 before GL.
+fn choose(instance: &wgpu::Instance, choice: AdapterChoice) -> Result<wgpu::Adapter> {
+    let wanted = std::env::var("WGPU_ADAPTER_NAME").unwrap_or_default().to_lowercase();
+    let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let names: Vec<String> = all.iter().map(|a| format!("\"{}\"", a.get_info().name)).collect();
+    let rank = |adapter: &wgpu::Adapter| {
+        let info = adapter.get_info();
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Other => 3,
+            wgpu::DeviceType::Cpu => 4,
+        };
+        (kind, info.backend == wgpu::Backend::Gl)
+    };
+    let usable = |adapter: &wgpu::Adapter| {
+        let info = adapter.get_info();
+        let compute =
+            adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
+        compute
+            && (choice == AdapterChoice::Any || is_hardware(&info))
+            && info.name.to_lowercase().contains(&wanted)
+    };
+    all.into_iter().filter(usable).min_by_key(rank).ok_or_else(|| Error::NoAdapter {
+        found: if names.is_empty() { "none".to_owned() } else { format!("only {}", names.join(", ")) },
+    })
+}
+
+/// A device for tests, opened once.
+///
+/// `None`, said on standard error, where there is no adapter.
+///
+/// # Panics
+/// Without an adapter where `GPBRDF_REQUIRE_GPU` is 1.
+#[cfg(test)]
+pub(crate) fn test_context() -> Option<&'static Context> {
+    static CONTEXT: OnceLock<Option<Context>> = OnceLock::new();
+    let context = CONTEXT.get_or_init(|| match Context::open(AdapterChoice::Any) {
+        Ok(context) => Some(context),
+        Err(error) if std::env::var("GPBRDF_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{error}"),
+        Err(error) => {
+            eprintln!("skipped: {error}");
+            None
+        }
+    });
+    context.as_ref()
+}
