@@ -16,12 +16,13 @@ use super::fitter::{Event, Fitter, Outbox, Request};
 use super::mailbox::Sender;
 use super::messages::Messages;
 use super::plots_panel::PlotCache;
+use super::scene::{SceneImage, SceneKey, SceneRequest, Shape};
 use super::session::{SavedDocument, Session};
 use super::settings::{Arrangement, Settings};
 use super::shortcuts::{self, Action};
 use super::slices::{SliceKey, SliceRequest, Surface};
 use super::spheres::{SphereKey, SphereRequest};
-use super::{curves, export, slices, spheres};
+use super::{curves, export, scene, slices, spheres};
 
 /// Slices as textures.
 pub(crate) struct ShownSlices {
@@ -73,6 +74,11 @@ pub struct Viewer {
     slicer: Sender<SliceRequest>,
     integrator: Sender<Vec<AlbedoRequest>>,
     renderer: Sender<SphereRequest>,
+    sceneries: Option<Sender<SceneRequest>>,
+    staged: Option<SceneKey>,
+    pub(crate) scene: Option<SceneImage>,
+    /// Pixels of the view of objects.
+    pub(crate) scene_size: [u32; 2],
     sliced: Option<SliceKey>,
     rendered: Option<SphereKey>,
     integrated: Vec<(DocumentId, u64, bool)>,
@@ -121,6 +127,10 @@ impl Viewer {
             fitter,
             outbox,
             events,
+            sceneries: None,
+            staged: None,
+            scene: None,
+            scene_size: [0; 2],
             sliced: None,
             rendered: None,
             integrated: Vec::new(),
@@ -140,6 +150,20 @@ impl Viewer {
         }
         viewer.open_paths(files);
         Ok(viewer)
+    }
+
+    /// Lights objects on the window's device.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn use_device(&mut self, state: &eframe::egui_wgpu::RenderState) -> Result<()> {
+        self.sceneries = Some(scene::spawn(self.outbox.clone(), state.clone())?);
+        Ok(())
+    }
+
+    /// Whether there is a device for objects.
+    pub(crate) fn has_device(&self) -> bool {
+        self.sceneries.is_some()
     }
 
     /// What is remembered from run to run.
@@ -299,6 +323,7 @@ impl Viewer {
                 Event::Chosen { purpose, paths } => self.chosen(purpose, &paths),
                 Event::Slices(images) => self.take_slices(ctx, *images),
                 Event::Spheres(images) => self.take_spheres(ctx, images),
+                Event::Scene(image) => self.scene = Some(image),
                 Event::Albedo(albedos) => self.albedos = albedos,
                 other => self.take_stage(other),
             }
@@ -401,6 +426,45 @@ impl Viewer {
         self.request_slices();
         self.request_spheres();
         self.request_albedos();
+        self.request_scene();
+    }
+
+    fn request_scene(&mut self) {
+        let Some(sender) = self.sceneries.as_ref().filter(|_| self.settings.shape != Shape::Sphere) else {
+            return;
+        };
+        let views = [Arrangement::All, Arrangement::Sphere];
+        if !views.contains(&self.settings.arrangement) || self.scene_size.contains(&0) {
+            return;
+        }
+        let Some(document) = self.document() else { return };
+        let Some(fitted) = &document.fitted else { return };
+        let exposure = self.spheres.as_ref().map_or(1.0, |s| s.images.exposure);
+        let key = SceneKey {
+            document: document.id,
+            version: fitted.version,
+            has_truth: document.truth.is_some(),
+            has_sigma: fitted.sigma.is_some(),
+            shape: self.settings.shape.clone(),
+            orbit: self.settings.orbit,
+            light: self.settings.light,
+            environment: self.environment.0,
+            exposure: super::widgets::narrow(exposure),
+            size: self.scene_size,
+            shown: self.settings.sphere,
+            swipe: self.settings.swipe,
+        };
+        if self.staged.as_ref() == Some(&key) {
+            return;
+        }
+        sender.put(SceneRequest {
+            key: key.clone(),
+            truth: document.truth.clone(),
+            mean: Arc::clone(&fitted.mean),
+            sigma: fitted.sigma.clone(),
+            environment: Arc::clone(&self.environment.2),
+        });
+        self.staged = Some(key);
     }
 
     fn request_slices(&mut self) {
@@ -512,6 +576,7 @@ impl Viewer {
                 self.open_paths(paths);
             }
             Purpose::Environment => self.open_environment(first),
+            Purpose::Object => self.settings.shape = Shape::File(first.clone()),
             Purpose::SaveSession => match Session::new(&self.documents, &self.settings).write(first) {
                 Ok(()) => {
                     self.settings.remember(first);

@@ -7,6 +7,7 @@ use super::fitter::{Event, Outbox};
 pub(crate) enum Purpose {
     Open,
     Environment,
+    Object,
     SaveSession,
     ExportSlices,
     ExportSphere,
@@ -27,6 +28,7 @@ pub(crate) fn ask(purpose: Purpose, outbox: &Outbox) {
             Purpose::Environment => {
                 dialog.add_filter("Environment maps", &["hdr", "exr"]).pick_file().into_iter().collect()
             }
+            Purpose::Object => dialog.add_filter("Wavefront OBJ", &["obj"]).pick_file().into_iter().collect(),
             Purpose::SaveSession => save(dialog, "session.json"),
             Purpose::ExportSlices => save(dialog, "slices.png"),
             Purpose::ExportSphere => save(dialog, "sphere.png"),

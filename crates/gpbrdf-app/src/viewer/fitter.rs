@@ -44,6 +44,8 @@ pub(crate) enum Event {
     Albedo(Vec<super::curves::Albedo>),
     /// Spheres in colour.
     Spheres(Box<super::spheres::SphereImages>),
+    /// An object on the device.
+    Scene(super::scene::SceneImage),
     /// Metrics of pictures of a result.
     Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
     /// An environment has been read, or not.

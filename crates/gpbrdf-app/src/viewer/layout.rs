@@ -20,7 +20,7 @@ impl Viewer {
         self.messages.messages_ui(ui);
         if self.settings.panels {
             Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
-            Panel::left("side").default_size(312.0).size_range(270.0..=420.0).show(ui, |ui| {
+            Panel::left("side").resizable(false).exact_size(320.0).show(ui, |ui| {
                 egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                     self.materials_ui(ui);
                     self.model_ui(ui);
@@ -191,13 +191,15 @@ impl Viewer {
             }
             Purpose::SaveModel => ("Save model", "The fitted model with its weights, as safetensors."),
             Purpose::Environment => ("Environment", "A latitude-longitude map, .hdr or .exr."),
+            Purpose::Object => ("Object", "A Wavefront OBJ file."),
             Purpose::Open => return,
         };
         let mut open = true;
         let mut chosen = None;
         egui::Window::new(title).open(&mut open).collapsible(false).default_width(420.0).show(ctx, |ui| {
             ui.label(what);
-            let verb = if purpose == Purpose::Environment { "Load" } else { "Write" };
+            let verb =
+                if matches!(purpose, Purpose::Environment | Purpose::Object) { "Load" } else { "Write" };
             chosen = self.path_row_ui(ui, "Path", verb, purpose);
         });
         if !open {

@@ -47,14 +47,14 @@ impl Messages {
                 Frame::new().fill(colour).corner_radius(4).inner_margin(6).outer_margin(2).show(ui, |ui| {
                     ui.horizontal(|ui| {
                         ui.label(RichText::new(mark).strong().color(Color32::WHITE));
-                        let width = ui.available_width() - 80.0;
-                        ui.allocate_ui(egui::vec2(width, 0.0), |ui| {
-                            ui.set_min_width(width);
-                            ui.add(egui::Label::new(RichText::new(message).color(Color32::WHITE)).wrap());
+                        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                            if ui.button("Dismiss").clicked() {
+                                read = Some(i);
+                            }
+                            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                                ui.add(egui::Label::new(RichText::new(message).color(Color32::WHITE)).wrap());
+                            });
                         });
-                        if ui.button("Dismiss").clicked() {
-                            read = Some(i);
-                        }
                     });
                 });
             }

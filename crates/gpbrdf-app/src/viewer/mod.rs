@@ -16,6 +16,7 @@ mod materials_panel;
 mod messages;
 mod model_panel;
 mod plots_panel;
+mod scene;
 mod session;
 mod settings;
 mod shortcuts;
@@ -78,7 +79,10 @@ pub fn main() -> ExitCode {
         options,
         Box::new(move |creation| {
             let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
-            let viewer = Viewer::new(&creation.egui_ctx, settings, &arguments.files)?;
+            let mut viewer = Viewer::new(&creation.egui_ctx, settings, &arguments.files)?;
+            if let Some(state) = &creation.wgpu_render_state {
+                viewer.use_device(state)?;
+            }
             Ok(Box::new(Window { viewer }))
         }),
     );

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::curves::CurveLook;
+use super::scene::{Orbit, Shape};
 use super::slices::SliceLook;
 use super::spheres::SphereLight;
 
@@ -29,7 +30,7 @@ impl Arrangement {
             Self::All => "Overview",
             Self::Slices => "Slices",
             Self::Plots => "Plots",
-            Self::Sphere => "Sphere",
+            Self::Sphere => "3-D",
         }
     }
 }
@@ -74,6 +75,8 @@ pub struct Settings {
     pub(crate) curves: CurveLook,
     pub(crate) sphere: SphereShown,
     pub(crate) light: SphereLight,
+    pub(crate) shape: Shape,
+    pub(crate) orbit: Orbit,
     /// Where the sphere is divided, in `[0, 1]`.
     pub(crate) swipe: f32,
 }
@@ -92,6 +95,8 @@ impl Default for Settings {
             curves: CurveLook::default(),
             sphere: SphereShown::Swipe,
             light: SphereLight::default(),
+            shape: Shape::Sphere,
+            orbit: Orbit::default(),
             swipe: 0.5,
         }
     }

@@ -34,15 +34,16 @@ pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 13] = [
     (Action::Overview, KeyboardShortcut::new(Modifiers::NONE, Key::Num1), "Show everything"),
     (Action::Slices, KeyboardShortcut::new(Modifiers::NONE, Key::Num2), "Show slices only"),
     (Action::Plots, KeyboardShortcut::new(Modifiers::NONE, Key::Num3), "Show plots only"),
-    (Action::Sphere, KeyboardShortcut::new(Modifiers::NONE, Key::Num4), "Show the sphere only"),
+    (Action::Sphere, KeyboardShortcut::new(Modifiers::NONE, Key::Num4), "Show 3-D only"),
 ];
 
 /// What the mouse does, for the help.
-pub(crate) const MOUSE: [(&str, &str); 7] = [
-    ("Left drag", "Pan slices and plots, turn the light of the sphere"),
+pub(crate) const MOUSE: [(&str, &str); 8] = [
+    ("Left drag", "Pan slices and plots, turn the light of the sphere, orbit objects"),
     ("Right drag, wheel", "Zoom"),
     ("Double click", "Reset the view"),
-    ("Shift + drag", "Sphere: move the line between truth and prediction"),
+    ("Shift + drag", "3-D: move the line between truth and prediction"),
+    ("Ctrl + drag", "Objects: turn the light"),
     ("Ctrl + click", "A number: back to its default"),
     ("Drop files", "Open them"),
     ("Ctrl + plus, minus, 0", "Larger, smaller, normal text and controls"),

@@ -19,6 +19,19 @@ const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
 const MEANINGS: [&str; 4] =
     ["f, 1/sr", "f, 1/sr", "ln(prediction + 0.001) - ln(truth + 0.001)", "standard deviation of the target"];
 
+/// What the axes take of a view.
+const AXES: egui::Vec2 = egui::vec2(58.0, 40.0);
+
+/// In how many columns views are largest.
+fn columns(views: usize, area: egui::Vec2) -> usize {
+    let side = |columns: usize| {
+        let rows = views.div_ceil(columns);
+        let (columns, rows) = (narrow(columns as f64), narrow(rows as f64));
+        (area.x / columns - AXES.x).min(area.y / rows - AXES.y - 24.0)
+    };
+    (1..=views.max(1)).max_by(|a, b| side(*a).total_cmp(&side(*b))).unwrap_or(1)
+}
+
 /// Regions of a slice at phi_d = 90 degrees: name, theta_h and theta_d in degrees.
 const REGIONS: [(&str, f64, f64); 4] = [
     ("specular", 6.0, 45.0),
@@ -75,47 +88,50 @@ impl Viewer {
         };
         let views: Vec<usize> = (0..4).filter(|&i| shown.textures[i].is_some()).collect();
         let gap = 10.0;
-        let count = narrow(views.len().max(1) as f64);
-        let width = ((ui.available_width() - gap * (count - 1.0)) / count).max(60.0);
-        let height = (ui.available_height() - 2.0).max(80.0);
+        let area = ui.available_size();
+        let columns = columns(views.len(), area);
+        let rows = views.len().div_ceil(columns);
+        let share = |total: f32, parts: usize| {
+            let parts = narrow(parts as f64);
+            ((total - gap * (parts - 1.0)) / parts).max(80.0)
+        };
+        let size = egui::vec2(share(area.x, columns), share(area.y, rows));
         let mut hovered = None;
-        ui.horizontal_top(|ui| {
-            ui.spacing_mut().item_spacing.x = gap;
-            for i in views {
-                let Some(texture) = &shown.textures[i] else { continue };
-                ui.allocate_ui(egui::vec2(width, height), |ui| {
-                    ui.vertical(|ui| {
-                        ui.spacing_mut().item_spacing.y = 2.0;
-                        title_ui(ui, i, shown.limits[i]);
-                        let point = self.slice_ui(ui, document, i, texture.id(), width);
-                        hovered = hovered.or(point);
+        for row in views.chunks(columns) {
+            ui.horizontal_top(|ui| {
+                ui.spacing_mut().item_spacing.x = gap;
+                for &i in row {
+                    let Some(texture) = &shown.textures[i] else { continue };
+                    ui.allocate_ui(size, |ui| {
+                        ui.set_min_size(size);
+                        ui.set_max_size(size);
+                        ui.vertical(|ui| {
+                            ui.spacing_mut().item_spacing.y = 2.0;
+                            title_ui(ui, i, shown.limits[i]);
+                            let point = self.slice_ui(ui, document, i, texture.id());
+                            hovered = hovered.or(point);
+                        });
                     });
-                });
-            }
-        });
+                }
+            });
+        }
         if let Some(angles) = hovered {
             hover_ui(ui, document, angles);
         }
     }
 
     /// One view; the angles under the pointer.
-    fn slice_ui(
-        &self,
-        ui: &mut Ui,
-        document: &Document,
-        i: usize,
-        texture: TextureId,
-        width: f32,
-    ) -> Option<HalfDiff> {
+    fn slice_ui(&self, ui: &mut Ui, document: &Document, i: usize, texture: TextureId) -> Option<HalfDiff> {
         let square = self.settings.slices.square_theta_h;
         let phi_d = self.settings.slices.phi_d.to_radians();
-        let (first, height) = (i == 0 || (i == 1 && !document.has_truth()), ui.available_height());
+        let room = ui.available_size();
+        let side = (room.x - AXES.x).min(room.y - AXES.y).max(40.0);
         let mut plot = Plot::new(("slice", i))
             .link_axis(egui::Id::unique("slices"), true)
             .link_cursor(egui::Id::unique("slices"), true)
             .data_aspect(1.0)
-            .width(width)
-            .height(height)
+            .width(side + AXES.x)
+            .height(side + AXES.y)
             .set_margin_fraction(egui::vec2(0.0, 0.0))
             .allow_scroll(false)
             .allow_boxed_zoom(false)
@@ -135,11 +151,12 @@ impl Viewer {
                     })
                     .label("θh"),
             ])
-            .custom_y_axes(if first {
-                vec![AxisHints::new_y().formatter(|mark, _| format!("{}°", short(mark.value))).label("θd")]
-            } else {
-                vec![AxisHints::new_y().formatter(|mark, _| format!("{}°", short(mark.value)))]
-            });
+            .custom_y_axes(vec![
+                AxisHints::new_y()
+                    .formatter(|mark, _| format!("{}°", short(mark.value)))
+                    .label("θd")
+                    .min_thickness(AXES.x - 22.0),
+            ]);
         if self.reset_views {
             plot = plot.reset();
         }

@@ -5,6 +5,7 @@ use gpbrdf_core::Colormap;
 
 use super::app::{ShownSpheres, Viewer};
 use super::dialogs::Purpose;
+use super::scene::{LIMIT, Orbit, Shape};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::spheres::SphereLight;
@@ -14,11 +15,12 @@ impl Viewer {
     /// The sphere and its controls.
     pub(crate) fn sphere_ui(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            ui.label(RichText::new("Sphere").strong().size(15.0));
+            ui.label(RichText::new("3-D").strong().size(15.0));
             ui.add_space(6.0);
             ui.scope(|ui| segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.menu_button("Light", |ui| self.light_ui(ui));
+                ui.menu_button("Shape", |ui| self.shape_ui(ui));
             });
         });
         let Some(id) = self.document().map(|d| d.id) else { return };
@@ -27,6 +29,10 @@ impl Viewer {
         let name = "Sphere view: drag turns the light";
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, name));
         ui.painter().rect_filled(area, 6.0, ui.visuals().extreme_bg_color);
+        if self.settings.shape != Shape::Sphere {
+            self.object_ui(ui, &response, area);
+            return;
+        }
         let Some(shown) = self.spheres.as_ref().filter(|s| s.images.key.document == id) else {
             ui.put(area, egui::Spinner::new().size(28.0));
             return;
@@ -104,6 +110,102 @@ impl Viewer {
         }
     }
 
+    fn shape_ui(&mut self, ui: &mut Ui) {
+        let device = self.has_device();
+        let mut shapes = vec![Shape::Sphere, Shape::Knot, Shape::RoundedBox];
+        if let Shape::File(_) = &self.settings.shape {
+            shapes.push(self.settings.shape.clone());
+        }
+        for shape in shapes {
+            let (chosen, possible) = (self.settings.shape == shape, device || shape == Shape::Sphere);
+            let radio = egui::RadioButton::new(chosen, shape.name());
+            let response = ui.add_enabled(possible, radio).on_disabled_hover_text("Needs a graphics device");
+            if response.clicked() {
+                self.settings.shape = shape;
+            }
+        }
+        if ui.add_enabled(device, egui::Button::new("OBJ file…")).clicked() {
+            self.ask_where(Purpose::Object, "");
+            ui.close();
+        }
+    }
+
+    /// An object on the device: left drag orbits, right drag and wheel zoom, Ctrl + drag turns the light.
+    fn object_ui(&mut self, ui: &mut Ui, response: &egui::Response, area: Rect) {
+        let picture = area.shrink(6.0);
+        let scale = ui.pixels_per_point().min(1.25);
+        self.scene_size = [picture.width(), picture.height()].map(|x| pixels(x * scale));
+        let Some(id) = self.document().map(|d| d.id) else { return };
+        if let Some(scene) = self.scene.as_ref().filter(|s| s.document == id) {
+            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+            ui.painter().image(scene.texture, picture, uv, Color32::WHITE);
+            let truth = self.document().is_some_and(|d| d.truth.is_some());
+            let split = matches!(self.settings.sphere, SphereShown::Swipe | SphereShown::SideBySide) && truth;
+            let font = egui::FontId::proportional(13.0);
+            let label = |x: f32, align: egui::Align2, text: &str| {
+                let at = pos2(x, picture.top() + 6.0);
+                ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
+                ui.painter().text(at, align, text, font.clone(), Color32::WHITE);
+            };
+            if split {
+                let x = egui::lerp(picture.left()..=picture.right(), self.settings.swipe);
+                let stroke = egui::Stroke::new(1.5, Color32::from_white_alpha(200));
+                ui.painter().line_segment([pos2(x, picture.top()), pos2(x, picture.bottom())], stroke);
+                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, "Truth");
+                label(picture.right() - 8.0, egui::Align2::RIGHT_TOP, "Prediction");
+            } else if truth && self.settings.sphere == SphereShown::Difference {
+                let text = format!("1 - prediction / truth, -{LIMIT} to +{LIMIT}");
+                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, &text);
+            } else if self.settings.sphere == SphereShown::Sigma {
+                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, &format!("Sigma, 0 to {LIMIT}"));
+            } else {
+                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, "Prediction");
+            }
+            let foot = match scene.quality {
+                Some((psnr, ssim)) => {
+                    format!("PSNR {psnr:.1} dB   SSIM {ssim:.4}   {} samples", scene.samples)
+                }
+                None => format!("{} samples", scene.samples),
+            };
+            let at = picture.left_bottom() + vec2(8.0, -6.0);
+            ui.painter().text(
+                at + vec2(1.0, 1.0),
+                egui::Align2::LEFT_BOTTOM,
+                &foot,
+                font.clone(),
+                Color32::BLACK,
+            );
+            ui.painter().text(at, egui::Align2::LEFT_BOTTOM, &foot, font.clone(), Color32::WHITE);
+        } else {
+            ui.put(area, egui::Spinner::new().size(28.0));
+        }
+        self.orbit_drag(ui, response, picture);
+    }
+
+    fn orbit_drag(&mut self, ui: &Ui, response: &egui::Response, picture: Rect) {
+        let modifiers = ui.input(|i| i.modifiers);
+        if response.double_clicked() {
+            self.settings.orbit = Orbit::default();
+            self.settings.swipe = 0.5;
+        } else if modifiers.command || modifiers.shift {
+            self.sphere_drag(ui, response, if modifiers.shift { picture } else { square(picture) });
+        } else if response.dragged_by(egui::PointerButton::Primary) {
+            let orbit = &mut self.settings.orbit;
+            orbit.azimuth -= response.drag_delta().x * 0.008;
+            orbit.elevation = (orbit.elevation + response.drag_delta().y * 0.008).clamp(-1.5, 1.5);
+        }
+        let mut factor = 1.0;
+        if response.hovered() {
+            factor *= (0.004 * ui.input(|i| i.smooth_scroll_delta().y)).exp();
+        }
+        if response.dragged_by(egui::PointerButton::Secondary) {
+            factor *= (0.01 * (response.drag_delta().x - response.drag_delta().y)).exp();
+        }
+        if factor != 1.0 {
+            self.settings.orbit.zoom = (self.settings.orbit.zoom * factor).clamp(0.3, 6.0);
+        }
+    }
+
     fn light_ui(&mut self, ui: &mut Ui) {
         let light = &mut self.settings.light;
         ui.radio_value(&mut light.point, false, format!("Environment: {}", self.environment.1));
@@ -126,6 +228,12 @@ impl Viewer {
             self.environment = (self.environment.0 + 1, "Studio (built in)".to_owned(), map);
         }
     }
+}
+
+/// Whole pixels, few enough for any device.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn pixels(x: f32) -> u32 {
+    x.round().clamp(16.0, 1600.0) as u32
 }
 
 /// What can be shown without a truth.

@@ -17,7 +17,7 @@ use super::slices::{colour, round_limit, shown};
 
 /// Pixels along each side, at first and at last.
 const COARSE: usize = 96;
-const FINE: usize = 320;
+const FINE: usize = 256;
 /// Lights that stand for an environment at first.
 const COARSE_PATCHES: (usize, usize) = (24, 12);
 
@@ -103,6 +103,8 @@ pub(crate) struct SphereImages {
     pub(crate) sigma: Option<(ColorImage, f64)>,
     pub(crate) psnr: Option<f64>,
     pub(crate) ssim: Option<f64>,
+    /// The factor of radiance in the pictures.
+    pub(crate) exposure: f64,
     /// Linear pictures, for files.
     pub(crate) linear: Vec<(&'static str, Image)>,
 }
@@ -115,9 +117,10 @@ pub(crate) fn spawn(
     outbox: Outbox,
     busy: impl Fn() -> bool + Send + Sync + 'static,
 ) -> std::io::Result<Sender<SphereRequest>> {
-    let mut kept: [Kept; 2] = [None, None];
+    let mut kept: [Kept; 3] = [None, None, None];
+    let passes = [(COARSE, COARSE_PATCHES), (FINE, COARSE_PATCHES), (FINE, ENV_PATCHES)];
     Mailbox::spawn("spheres", move |request: SphereRequest, stale| {
-        for (i, (size, patches)) in [(COARSE, COARSE_PATCHES), (FINE, ENV_PATCHES)].into_iter().enumerate() {
+        for (i, (size, patches)) in passes.into_iter().enumerate() {
             while i > 0 && busy() {
                 if stale() {
                     return;
@@ -126,10 +129,11 @@ pub(crate) fn spawn(
             }
             let Some(images) = make(&request, size, patches, &mut kept[i], stale) else { return };
             outbox.send(Event::Spheres(Box::new(images)));
-        }
-        if let Some(images) = request.wants_metrics.then(|| metrics(&request, stale)).flatten() {
-            let (document, version) = (request.key.document, request.key.version);
-            outbox.send(Event::Images { document, version, images: Box::new(images) });
+            let wanted = i == 1 && request.wants_metrics;
+            if let Some(images) = wanted.then(|| metrics(&request, stale)).flatten() {
+                let (document, version) = (request.key.document, request.key.version);
+                outbox.send(Event::Images { document, version, images: Box::new(images) });
+            }
         }
     })
 }
@@ -174,13 +178,14 @@ fn make(
     };
     Some(SphereImages {
         key,
-        fine: size == FINE,
+        fine: size == FINE && patches == ENV_PATCHES,
         truth: truth.as_ref().map(plain),
         mean: plain(&mean),
         difference,
         sigma,
         psnr,
         ssim,
+        exposure: scale,
         linear: truth.map(|t| ("truth", t)).into_iter().chain([("prediction", mean)]).collect(),
     })
 }

@@ -7,7 +7,7 @@ use eframe::egui::{self, ComboBox, Response, RichText, Slider, Ui};
 /// Width of the labels of a form.
 const LABEL_WIDTH: f32 = 104.0;
 /// Width of the number beside a slider.
-const NUMBER_WIDTH: f32 = 70.0;
+const NUMBER_WIDTH: f32 = 86.0;
 
 /// A number to set.
 #[derive(Clone, Debug)]
