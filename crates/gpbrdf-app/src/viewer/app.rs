@@ -186,15 +186,20 @@ impl Viewer {
     /// Whether nothing is being read, fitted or drawn.
     #[must_use]
     pub fn is_settled(&self) -> bool {
-        let settled = |d: &Document| match &d.work {
-            Work::Failed(_) | Work::Cancelled => true,
-            Work::Idle => d.fitted.is_some(),
-            _ => false,
-        };
-        let shown = self.slices.as_ref().map(|s| s.key) == self.sliced;
         let drawn = self.spheres.as_ref().map(|s| (s.images.key, s.images.fine));
         let drawn = drawn == self.rendered.map(|key| (key, true));
-        self.documents.iter().all(settled) && shown && drawn
+        self.is_fitted() && drawn
+    }
+
+    /// Whether nothing is being read or fitted, and the slices show it; spheres may still be refined.
+    #[must_use]
+    pub fn is_fitted(&self) -> bool {
+        let fitted = |d: &Document| match &d.work {
+            Work::Failed(_) | Work::Cancelled => true,
+            Work::Idle => d.fitted.is_some() && d.asked.as_ref() == Some(&d.spec),
+            _ => false,
+        };
+        self.documents.iter().all(fitted) && self.slices.as_ref().map(|s| s.key) == self.sliced
     }
 
     /// A number that changes with every result that is shown.

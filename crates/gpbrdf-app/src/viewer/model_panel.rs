@@ -199,7 +199,10 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
         return;
     };
     let line = |ui: &mut Ui, name: &str, value: String, help: &str| {
-        row_ui(ui, name, |ui| ui.label(RichText::new(value).strong()).on_hover_text(help));
+        row_ui(ui, name, |ui| {
+            let spoken = format!("{name}: {value}");
+            ui.label(RichText::new(value).strong()).on_hover_text(help).accessible_name(spoken);
+        });
     };
     let dots = || "…".to_owned();
     line(
