@@ -9,6 +9,7 @@ mod cli {
     mod commands;
     mod dense;
     mod device;
+    mod inducing;
     mod measured;
     mod odd_input;
     mod process;

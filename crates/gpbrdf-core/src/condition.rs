@@ -28,7 +28,8 @@ pub enum Hyper {
 }
 
 impl Hyper {
-    /// The hyper-parameters of a model, of its first channel where they differ.
+    /// The hyper-parameters of a model, of its first channel where they differ; none of a compressed table, which has
+    /// no measurements to condition on.
     #[must_use]
     pub fn of(model: &Model) -> Option<Self> {
         match &model.process {
@@ -36,6 +37,7 @@ impl Hyper {
             Process::Dense(groups) => groups
                 .first()
                 .map(|gp| Self::Dense { kernel: gp.kernel().clone(), noise_variance: gp.noise_variance() }),
+            Process::Inducing(_) => None,
         }
     }
 }

@@ -138,6 +138,7 @@ impl LatticeLayout {
             density: self.node_density,
             v_density: self.v_density,
             symmetry: self.symmetry,
+            tail: 1.0,
         }
     }
 

@@ -43,14 +43,17 @@ mod angles;
 mod atomic_file;
 mod bake;
 mod brdf;
+mod cell_grid;
 mod colormap;
 mod condition;
 mod environment;
 mod error;
 mod figure;
 mod fit;
+mod fit_table;
 mod formats;
 mod gp;
+mod half;
 mod image_metrics;
 mod kernel;
 mod layout;
@@ -85,6 +88,7 @@ pub use environment::{EnvDirection, Environment};
 pub use error::{Error, Result};
 pub use figure::{Panel, Scale, panel_figure, round_limit, slice_figure, sphere_figure};
 pub use fit::{FitOptions, Layout, SampleSet, Solver, detect_symmetry, fit};
+pub use fit_table::{CellWeights, InducingSize, TableFitOptions, fit_table};
 pub use formats::cornell::read_cornell;
 pub use formats::image_exr::write_image_exr;
 pub use formats::merl::{MERL_BYTES, read_merl, write_merl, write_merl_to};
@@ -96,9 +100,9 @@ pub use formats::samples_csv::{
 pub use formats::table_exr::{ExrChannels, ExrPart, read_table_exr, write_table_exr, write_table_exr_to};
 pub use formats::{FileKind, recognise, sha256_file, sha256_hex};
 pub use gp::{
-    DenseCost, DenseEvaluator, DenseGp, DenseLikelihood, FitReport, LatticeData, LatticeGp, LatticeHyper,
-    LatticeLikelihood, LeaveOneOut, Noise, OptimizeOptions, Optimum, Parameter, dense_cost, fit_dense,
-    fit_lattice, maximize,
+    DenseCost, DenseEvaluator, DenseGp, DenseLikelihood, FitReport, InducingComponent, InducingGp,
+    InducingShape, LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood, LeaveOneOut, Noise,
+    OptimizeOptions, Optimum, Parameter, dense_cost, fit_dense, fit_lattice, maximize,
 };
 pub use image_metrics::{ImageMetrics, PixelDifference, exposure_of, psnr, ssim};
 pub use kernel::{AxisMetric, Kernel, Kernel1d, KernelBody, KernelTerm, ParameterKind, Shape, Term1d};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 use crate::error::Result;
-use crate::gp::{DenseGp, LatticeGp};
+use crate::gp::{DenseGp, InducingGp, LatticeGp};
 use crate::layout::LatticeLayout;
 use crate::space::InputSpace;
 use crate::target::{MeanFunction, Transform};
@@ -23,7 +23,7 @@ pub struct Provenance {
     pub source: String,
     /// sha256 of that file, hexadecimal; empty for built-in materials.
     pub sha256: String,
-    /// Name of the layout: `lattice`, `random`, `cells` or `samples`.
+    /// Name of the layout: `lattice`, `random`, `cells`, `samples` or `table`.
     pub layout: String,
     /// The lattice, where there is one.
     pub lattice: Option<LatticeLayout>,
@@ -37,6 +37,8 @@ pub enum Process {
     Lattice(Vec<LatticeGp>),
     /// On any points.
     Dense(Vec<DenseGp>),
+    /// Sparse, fitted to a whole table: few numbers stored.
+    Inducing(Box<InducingGp>),
 }
 
 /// A fitted Gaussian-process BRDF: `f = g^-1(m + GP(coordinates(wi, wo)))` for each channel.
@@ -83,6 +85,11 @@ impl Model {
     /// give NaN.
     #[must_use]
     pub fn predict_target(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
+        if let Process::Inducing(gp) = &self.process {
+            let parts = each_component(gp, angles, LatticeGp::predict_mean);
+            let colours = parts.into_iter().map(|parts| gp.colour(parts));
+            return colours.map(|rgb| std::array::from_fn(|c| self.offsets[c] + rgb[c])).collect();
+        }
         let points: Vec<[f64; 3]> = angles.iter().map(|&a| self.space.coordinates(a)).collect();
         let mut out = vec![self.offsets; points.len()];
         let mut first = 0;
@@ -105,6 +112,7 @@ impl Model {
                     );
                 }
             }
+            Process::Inducing(_) => {}
         }
         out
     }
@@ -119,6 +127,12 @@ impl Model {
     /// Variance of the target at each pair of directions, for each channel.
     #[must_use]
     pub fn predict_variance(&self, angles: &[HalfDiff], of: IntervalOf) -> Vec<Rgb> {
+        if let Process::Inducing(gp) = &self.process {
+            let noise = if of == IntervalOf::Observation { gp.noise_variances() } else { [0.0; 3] };
+            let parts = each_component(gp, angles, LatticeGp::predict_variance_latent);
+            let colours = parts.into_iter().map(|parts| gp.colour_variance(parts));
+            return colours.map(|rgb| std::array::from_fn(|c| rgb[c] + noise[c])).collect();
+        }
         let points: Vec<[f64; 3]> = angles.iter().map(|&a| self.space.coordinates(a)).collect();
         let mut out = vec![[0.0; 3]; points.len()];
         let mut first = 0;
@@ -143,6 +157,7 @@ impl Model {
                     set(&variances, gp.noise_variance(), gp.channels());
                 }
             }
+            Process::Inducing(_) => {}
         }
         out
     }
@@ -170,6 +185,7 @@ impl Model {
         let groups: Vec<(f64, usize)> = match &self.process {
             Process::Lattice(g) => g.iter().map(|g| (g.hyper().noise_variance, g.data().channels)).collect(),
             Process::Dense(g) => g.iter().map(|g| (g.noise_variance(), g.channels())).collect(),
+            Process::Inducing(gp) => return gp.noise_variances(),
         };
         let all = groups.into_iter().flat_map(|(noise, channels)| std::iter::repeat_n(noise, channels));
         out.iter_mut().zip(all).for_each(|(out, noise)| *out = noise);
@@ -181,6 +197,7 @@ impl Model {
         let channels: Vec<usize> = match &self.process {
             Process::Lattice(groups) => groups.iter().map(|g| g.data().channels).collect(),
             Process::Dense(groups) => groups.iter().map(DenseGp::channels).collect(),
+            Process::Inducing(_) => vec![3],
         };
         let mut first = 0;
         channels
@@ -192,12 +209,35 @@ impl Model {
             .collect()
     }
 
-    /// Number of measured directions.
+    /// Numbers that the model stores, another size than the number of samples: values or weights of all channels,
+    /// positions of nodes or samples, prior means, colour matrix, densities and hyper-parameters.
+    #[must_use]
+    pub fn floats(&self) -> usize {
+        match &self.process {
+            Process::Lattice(groups) => {
+                let group = |gp: &LatticeGp| {
+                    let nodes: usize = gp.data().shape().iter().sum();
+                    let kernels: usize = gp.hyper().kernels.iter().map(|k| k.n_parameters()).sum();
+                    gp.weights().len() + nodes + kernels + 2
+                };
+                self.offsets.len() + groups.iter().map(group).sum::<usize>()
+            }
+            Process::Dense(groups) => {
+                let group =
+                    |gp: &DenseGp| gp.n_samples() * (3 + gp.channels()) + gp.kernel().n_parameters() + 1;
+                self.offsets.len() + groups.iter().map(group).sum::<usize>()
+            }
+            Process::Inducing(gp) => gp.floats(),
+        }
+    }
+
+    /// Number of measured directions; of a model of a whole table, its valid cells.
     #[must_use]
     pub fn samples(&self) -> usize {
         match &self.process {
             Process::Lattice(groups) => groups.first().map_or(0, |g| g.data().len()),
             Process::Dense(groups) => groups.first().map_or(0, DenseGp::n_samples),
+            Process::Inducing(gp) => gp.cells,
         }
     }
 }
@@ -215,6 +255,21 @@ impl Brdf for Model {
     }
 }
 
+/// A quantity of all three components at each pair of directions.
+fn each_component(
+    gp: &InducingGp,
+    angles: &[HalfDiff],
+    of: impl Fn(&LatticeGp, &[[f64; 3]]) -> Vec<f64>,
+) -> Vec<[f64; 3]> {
+    let mut out = vec![[0.0; 3]; angles.len()];
+    for (k, component) in gp.components.iter().enumerate() {
+        let space = component.lattice().space;
+        let points: Vec<[f64; 3]> = angles.iter().map(|&a| space.coordinates(a)).collect();
+        out.iter_mut().zip(of(component.gp(), &points)).for_each(|(out, x)| out[k] = x);
+    }
+    out
+}
+
 /// The interval that a table of means and a standard deviation stand for: `g^-1(g(mean) -+ 1.96 sigma)`.
 #[must_use]
 pub fn interval_95(transform: Transform, mean: f64, standard_deviation: f64) -> (f64, f64) {
@@ -228,6 +283,7 @@ pub(crate) fn check_channels(process: &Process) -> Result<()> {
     let channels: usize = match process {
         Process::Lattice(groups) => groups.iter().map(|g| g.data().channels).sum(),
         Process::Dense(groups) => groups.iter().map(DenseGp::channels).sum(),
+        Process::Inducing(gp) => return gp.validate(),
     };
     if channels == 3 {
         Ok(())

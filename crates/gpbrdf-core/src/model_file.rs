@@ -1,8 +1,9 @@
 //! Models on disk: safetensors with everything that is not a tensor as JSON in its metadata.
 //!
-//! Tensors are f64. A lattice process `g` has `g.u`, `g.v`, `g.phi` (kernel coordinates of the nodes),
+//! Tensors are f64 but for inducing values. A lattice process `g` has `g.u`, `g.v`, `g.phi` (kernel coordinates of the nodes),
 //! `g.targets` and `g.weights` (`channels x A x B x C`); a dense one `g.x` (`n x 3`), `g.targets` and `g.weights`
-//! (`n x channels`). The metadata entry `gpbrdf` holds the rest, with numbers that read back to the same bits;
+//! (`n x channels`). Component `k` of an inducing process has `k.values` (`A x B x C`), in f16, from which nodes and
+//! weights follow. The metadata entry `gpbrdf` holds the rest, with numbers that read back to the same bits;
 //! `version` is the format's version.
 
 use std::collections::{BTreeMap, HashMap};
@@ -12,7 +13,10 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::gp::{DenseGp, LatticeData, LatticeGp, LatticeHyper};
+use crate::gp::{
+    DenseGp, InducingComponent, InducingGp, InducingShape, LatticeData, LatticeGp, LatticeHyper,
+};
+use crate::half::to_half;
 use crate::kernel::Kernel;
 use crate::model::{Model, Process, Provenance, check_channels};
 use crate::space::InputSpace;
@@ -39,6 +43,14 @@ struct Header {
 enum ProcessHeader {
     Lattice(Vec<LatticeHyper>),
     Dense(Vec<DenseHeader>),
+    Inducing(InducingHeader),
+}
+
+#[derive(Serialize, Deserialize)]
+struct InducingHeader {
+    mix: [[f64; 3]; 3],
+    cells: usize,
+    components: Vec<InducingShape>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -54,9 +66,10 @@ impl Model {
     /// # Errors
     /// Numbers that JSON cannot hold.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
-        let mut tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)> = BTreeMap::new();
+        let mut tensors: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)> = BTreeMap::new();
         let mut insert = |name: String, shape: Vec<usize>, values: &[f64]| {
-            tensors.insert(name, (shape, values.iter().flat_map(|x| x.to_le_bytes()).collect()));
+            let bytes = values.iter().flat_map(|x| x.to_le_bytes()).collect();
+            tensors.insert(name, (Dtype::F64, shape, bytes));
         };
         let process = match &self.process {
             Process::Lattice(groups) => {
@@ -83,6 +96,15 @@ impl Model {
                 }
                 ProcessHeader::Dense(headers)
             }
+            Process::Inducing(gp) => {
+                for (k, component) in gp.components.iter().enumerate() {
+                    let bytes = component.values().iter().flat_map(|&x| to_half(x).to_le_bytes()).collect();
+                    let shape = component.lattice().shape.to_vec();
+                    tensors.insert(format!("{k}.values"), (Dtype::F16, shape, bytes));
+                }
+                let components = gp.components.iter().map(|c| c.lattice().clone()).collect();
+                ProcessHeader::Inducing(InducingHeader { mix: gp.mix, cells: gp.cells, components })
+            }
         };
         let header = Header {
             version: VERSION,
@@ -98,7 +120,7 @@ impl Model {
         let json = serde_json::to_string(&header).map_err(|e| unwritable(&e))?;
         let views = tensors
             .iter()
-            .map(|(name, (shape, bytes))| Ok((name, TensorView::new(Dtype::F64, shape.clone(), bytes)?)))
+            .map(|(name, (dtype, shape, bytes))| Ok((name, TensorView::new(*dtype, shape.clone(), bytes)?)))
             .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
             .map_err(|e| unwritable(&e))?;
         safetensors::serialize(views, Some(HashMap::from([("gpbrdf".to_owned(), json)])))
@@ -143,11 +165,19 @@ impl Model {
         let read = |name: String| -> Result<Vec<f64>> {
             let tensor =
                 tensors.tensor(&name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
-            if tensor.dtype() != Dtype::F64 {
-                return Err(wrong(&format!("f64 in tensor \"{name}\""), format!("{:?}", tensor.dtype())));
-            }
-            let (chunks, _) = tensor.data().as_chunks::<8>();
-            let values: Vec<f64> = chunks.iter().map(|b| f64::from_le_bytes(*b)).collect();
+            let values: Vec<f64> = match tensor.dtype() {
+                Dtype::F64 => {
+                    let (chunks, _) = tensor.data().as_chunks::<8>();
+                    chunks.iter().map(|b| f64::from_le_bytes(*b)).collect()
+                }
+                Dtype::F16 => {
+                    let (chunks, _) = tensor.data().as_chunks::<2>();
+                    chunks.iter().map(|b| ::half::f16::from_le_bytes(*b).to_f64()).collect()
+                }
+                other => {
+                    return Err(wrong(&format!("f64 or f16 in tensor \"{name}\""), format!("{other:?}")));
+                }
+            };
             match values.iter().position(|x| !x.is_finite()) {
                 None => Ok(values),
                 Some(i) => Err(wrong(
@@ -188,6 +218,13 @@ impl Model {
                         .map_err(damaged)
                 });
                 Process::Dense(groups.collect::<Result<_>>()?)
+            }
+            ProcessHeader::Inducing(InducingHeader { mix, cells, components }) => {
+                let components = components.into_iter().enumerate().map(|(k, lattice)| {
+                    InducingComponent::new(lattice, read(format!("{k}.values"))?).map_err(damaged)
+                });
+                let components = components.collect::<Result<_>>()?;
+                Process::Inducing(Box::new(InducingGp { mix, components, cells }))
             }
         };
         check_channels(&process).map_err(damaged)?;

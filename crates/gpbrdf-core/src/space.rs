@@ -14,8 +14,9 @@ use crate::layout::Symmetry;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum InputSpace {
-    /// The warped box, stretched where nodes crowd: `(u^(1/density), min(v, 1)^(1/v_density), phi)`. Directions below the
-    /// horizon stand for the horizon.
+    /// The warped box, stretched where nodes crowd: `(1 - (1 - u^(1/density))^tail, min(v, 1)^(1/v_density), phi)`.
+    /// Directions below the horizon stand for the horizon. The first is the distribution function of P. Kumaraswamy
+    /// (1980), as in J. Snoek et al., "Input Warping for Bayesian Optimization" (2014); a power where `tail` is 1.
     WarpedBox {
         /// Exponent of the warp along `u`.
         density: f64,
@@ -23,6 +24,9 @@ pub enum InputSpace {
         v_density: f64,
         /// Symmetry in `phi_d`; [`Symmetry::Bilateral`] folds `phi` to `[0, pi/2]`.
         symmetry: Symmetry,
+        /// Second exponent of the warp along `u`: below 1 nodes crowd towards `theta_h = pi/2`, above 1 they thin out.
+        #[serde(default = "one")]
+        tail: f64,
     },
     /// `(theta_h, theta_d, phi_d)` in radians, as they are: the paper's own setting.
     HalfDiff,
@@ -51,8 +55,8 @@ impl InputSpace {
     /// A density that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         match self {
-            Self::WarpedBox { density, v_density, .. } => {
-                let bad = [density, v_density].into_iter().find(|x| !(*x > 0.0 && x.is_finite()));
+            Self::WarpedBox { density, v_density, tail, .. } => {
+                let bad = [density, v_density, tail].into_iter().find(|x| !(*x > 0.0 && x.is_finite()));
                 bad.map_or(Ok(()), |x| Err(Error::argument("node density", "a positive number", x)))
             }
             Self::HalfDiff => Ok(()),
@@ -63,7 +67,11 @@ impl InputSpace {
     #[must_use]
     pub fn warp_u(self, u: f64) -> f64 {
         match self {
-            Self::WarpedBox { density, .. } => u.powf(1.0 / density),
+            Self::WarpedBox { density, tail, .. } => {
+                let power = u.powf(1.0 / density);
+                // Left as it is where there is nothing to do, to the last bit.
+                if tail == 1.0 { power } else { 1.0 - (1.0 - power.min(1.0)).powf(tail) }
+            }
             Self::HalfDiff => u * u * FRAC_PI_2,
         }
     }
@@ -102,6 +110,11 @@ impl InputSpace {
     }
 }
 
+/// The tail of files that have none.
+fn one() -> f64 {
+    1.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,9 +122,18 @@ mod tests {
 
     #[test]
     fn warped_box_folds_and_stops_at_the_horizon() {
-        let folded = InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Bilateral };
-        let circle = InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Reciprocal };
+        let folded =
+            InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Bilateral, tail: 1.0 };
+        let circle =
+            InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Reciprocal, tail: 1.0 };
         let angles = HalfDiff { theta_h: 0.4, theta_d: 0.3, phi_d: 2.0 };
+        let tailed =
+            InputSpace::WarpedBox { density: 1.0, v_density: 1.0, symmetry: Symmetry::Bilateral, tail: 2.0 };
+        assert!(
+            (tailed.warp_u(0.3) - 0.51).abs() < 1e-15
+                && tailed.warp_u(1.0) == 1.0
+                && tailed.warp_u(0.0) == 0.0
+        );
         let mirrored = HalfDiff { phi_d: PI - 2.0, ..angles };
         let (a, b) = (folded.coordinates(angles), folded.coordinates(mirrored));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15), "{a:?} {b:?}");

@@ -137,7 +137,7 @@ pub fn render_sphere(
 ) -> Option<Vec<Image>> {
     let center = |i: usize| 2.0 * (i as f64 + 0.5) / size as f64 - 1.0;
     let tiles = size.div_ceil(TILE);
-    let shaded: Option<Vec<Vec<(usize, Vec<Rgb>)>>> = (0..tiles * tiles)
+    let shaded: Option<Vec<Shaded>> = (0..tiles * tiles)
         .into_par_iter()
         .map(|tile| {
             if cancelled() {
@@ -237,12 +237,11 @@ fn any_perpendicular(normal: &Vector3<f64>) -> Vector3<f64> {
     (axis - axis.dot(normal) * normal).normalize()
 }
 
-/// Radiance of each pixel for each table. Light by light, since neighbouring pixels read neighbouring cells.
-fn shade(
-    tables: &[&BrdfTable],
-    lights: &[DistantLight],
-    pixels: &[(usize, ShadingFrame)],
-) -> Vec<(usize, Vec<Rgb>)> {
+/// Pixels of a tile: where each stands, and its radiance for each table.
+type Shaded = Vec<(usize, Vec<Rgb>)>;
+
+/// Shades a tile. Light by light, since neighbouring pixels read neighbouring cells.
+fn shade(tables: &[&BrdfTable], lights: &[DistantLight], pixels: &[(usize, ShadingFrame)]) -> Shaded {
     let mut radiance: Vec<_> = pixels.iter().map(|&(i, _)| (i, vec![[0.0; 3]; tables.len()])).collect();
     for light in lights {
         for ((_, frame), (_, sums)) in pixels.iter().zip(&mut radiance) {

@@ -59,6 +59,15 @@ impl Transform {
         }
     }
 
+    /// `df / dg` at the target `g`.
+    pub(crate) fn slope_of_inverse(self, g: f64) -> f64 {
+        match self {
+            Self::Identity => 1.0,
+            Self::Log { .. } => g.exp(),
+            Self::CubeRoot => 3.0 * g * g,
+        }
+    }
+
     /// Checks the parameters.
     ///
     /// # Errors

@@ -41,7 +41,7 @@ impl Info {
             }
             Content::Model(model) => {
                 let (solver, kernel, hyperparameters) = describe(model);
-                json!({ "samples": model.samples(), "solver": solver, "kernel": kernel, "transform": model.transform,
+                json!({ "samples": model.samples(), "floats": model.floats(), "solver": solver, "kernel": kernel, "transform": model.transform,
                     "provenance": model.provenance, "hyperparameters": hyperparameters })
             }
         };

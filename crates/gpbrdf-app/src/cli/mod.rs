@@ -5,6 +5,7 @@ mod bake;
 mod convert;
 mod eval;
 mod fit;
+mod inducing_args;
 mod info;
 mod input;
 mod materials;

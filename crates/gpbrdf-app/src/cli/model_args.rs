@@ -3,10 +3,12 @@
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::{
-    FitOptions, FitReport, LatticeLayout, Layout, MeanFunction, Model, Noise, OptimizeOptions, Provenance,
-    SampleSet, Shape, Solver, Source, Symmetry, Transform, dense_cost, detect_symmetry,
+    Brdf, FitOptions, FitReport, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Noise,
+    OptimizeOptions, Provenance, SampleSet, Shape, Solver, Source, Symmetry, TableFitOptions, Transform,
+    dense_cost, detect_symmetry, fit_table,
 };
 
+use super::inducing_args::InducingArgs;
 use super::report::Seconds;
 use super::terminal::Terminal;
 
@@ -73,6 +75,8 @@ pub(crate) struct ModelArgs {
     /// Hyper-parameters for each channel instead of shared ones.
     #[arg(long)]
     per_channel: bool,
+    #[command(flatten)]
+    inducing: InducingArgs,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +116,7 @@ enum MeanName {
     Zero,
 }
 
-fn parse_lattice(text: &str) -> Result<[usize; 3], String> {
+pub(super) fn parse_lattice(text: &str) -> Result<[usize; 3], String> {
     let sides: Vec<usize> = text.split(['x', 'X']).map_while(|side| side.parse().ok()).collect();
     match <[usize; 3]>::try_from(sides) {
         Ok(sides) if text.split(['x', 'X']).count() == 3 => Ok(sides),
@@ -138,18 +142,75 @@ impl ModelArgs {
         seconds: &mut Seconds,
         terminal: &Terminal,
     ) -> Result<(Model, Vec<FitReport>)> {
-        let samples =
-            seconds.measure("sample", || terminal.stage("sampling", || self.sample(source, terminal)))?;
-        let options = self.fit_options()?;
         let provenance = Provenance {
             material: source.name.clone(),
             source: source.origin(),
             sha256: source.sha256.clone(),
             ..Provenance::default()
         };
+        if let Some(size) = self.inducing.size() {
+            return self.compress(source, size, provenance, seconds, terminal);
+        }
+        let samples =
+            seconds.measure("sample", || terminal.stage("sampling", || self.sample(source, terminal)))?;
+        let options = self.fit_options()?;
         Ok(seconds.measure("fit", || {
             terminal.stage("fitting", || gpbrdf_core::fit(&samples, &options, provenance))
         })?)
+    }
+
+    /// Fits inducing lattices to the whole table of a source.
+    fn compress(
+        &self,
+        source: &Source,
+        size: InducingSize,
+        provenance: Provenance,
+        seconds: &mut Seconds,
+        terminal: &Terminal,
+    ) -> Result<(Model, Vec<FitReport>)> {
+        for (option, found) in [
+            ("--layout", self.layout != LayoutName::Lattice),
+            ("--solver", !matches!(self.solver, SolverName::Auto)),
+            ("--mean", !matches!(self.mean, MeanName::Constant)),
+            ("--noise", self.noise.0 != Noise::Optimized),
+        ] {
+            if found {
+                bail!("{option}: expected its default for inducing lattices, found another value");
+            }
+        }
+        let options = self.fit_options()?;
+        let [kernel] = options.kernel[..] else {
+            bail!("--kernel: expected one shape for inducing lattices, found {}", options.kernel.len());
+        };
+        let table = seconds.measure("sample", || terminal.stage("tabulating", || source.table()));
+        let (Some(table), Some(brdf)) = (table, source.brdf()) else {
+            bail!(
+                "{}: expected a whole table for inducing lattices, found scattered samples",
+                source.origin()
+            );
+        };
+        let symmetry = self.measured_symmetry(brdf, terminal);
+        let options = TableFitOptions {
+            size,
+            symmetry,
+            kernel,
+            transform: options.transform,
+            weights: self.inducing.weights(),
+            ..TableFitOptions::default()
+        };
+        Ok(seconds
+            .measure("fit", || terminal.stage("fitting", || fit_table(&table, &options, provenance)))?)
+    }
+
+    /// The symmetry that was asked for, or that of the source.
+    fn measured_symmetry(&self, brdf: &dyn Brdf, terminal: &Terminal) -> Symmetry {
+        let symmetry = match self.symmetry {
+            SymmetryName::Auto => detect_symmetry(brdf),
+            SymmetryName::Bilateral => Symmetry::Bilateral,
+            SymmetryName::Reciprocal => Symmetry::Reciprocal,
+        };
+        terminal.detail(&format!("symmetry: {symmetry:?}"));
+        symmetry
     }
 
     /// Measures a source as asked for.
@@ -173,12 +234,7 @@ impl ModelArgs {
         let Some(brdf) = source.brdf() else { bail!("{}: nothing to sample", source.origin()) };
         let layout = match self.layout {
             LayoutName::Lattice => {
-                let symmetry = match self.symmetry {
-                    SymmetryName::Auto => detect_symmetry(brdf),
-                    SymmetryName::Bilateral => Symmetry::Bilateral,
-                    SymmetryName::Reciprocal => Symmetry::Reciprocal,
-                };
-                terminal.detail(&format!("symmetry: {symmetry:?}"));
+                let symmetry = self.measured_symmetry(brdf, terminal);
                 let mut lattice = match self.lattice {
                     Some(shape) => LatticeLayout::with_shape(shape, symmetry),
                     None => LatticeLayout::with_samples(self.samples.unwrap_or(PAPER_SAMPLES), symmetry)?,

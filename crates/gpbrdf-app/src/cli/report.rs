@@ -19,7 +19,10 @@ pub(crate) struct Report {
     pub(crate) source: String,
     pub(crate) layout: String,
     pub(crate) lattice: Option<LatticeLayout>,
+    /// Measurements taken, or cells of a table that was compressed.
     pub(crate) samples: usize,
+    /// Numbers that the model stores: another size.
+    pub(crate) floats: usize,
     pub(crate) solver: &'static str,
     pub(crate) kernel: String,
     pub(crate) transform: Value,
@@ -76,6 +79,7 @@ impl Report {
             layout: provenance.layout.clone(),
             lattice: provenance.lattice.clone(),
             samples: model.samples(),
+            floats: model.floats(),
             solver,
             kernel,
             transform: serde_json::to_value(model.transform).unwrap_or_default(),
@@ -110,12 +114,14 @@ impl Report {
             let [a, b, c] = l.shape;
             format!(" ({a}x{b}x{c})")
         });
+        let what = if self.layout == "table" { "cells" } else { "samples" };
         lines.push(format!(
-            "  {} samples, {}{grid}, {} solver, kernel {}",
-            self.samples, self.layout, self.solver, self.kernel
+            "  {} {}, {}{grid}, {} solver, kernel {}; {} floats stored",
+            self.samples, what, self.layout, self.solver, self.kernel, self.floats
         ));
+        let bound = if self.solver == "inducing" { "bound on the " } else { "" };
         lines.push(format!(
-            "  log marginal likelihood {:.1} after {} evaluations{}",
+            "  {bound}log marginal likelihood {:.1} after {} evaluations{}",
             self.log_marginal_likelihood,
             self.evaluations,
             if self.converged { "" } else { ", NOT converged" }
@@ -235,6 +241,26 @@ pub(crate) fn describe(model: &Model) -> (&'static str, String, Value) {
                 (gp.kernel().name(), value)
             });
             ("dense", each.collect())
+        }
+        Process::Inducing(gp) => {
+            let each = gp.components.iter().map(|component| {
+                let lattice = component.lattice();
+                let lengths: Vec<Value> =
+                    lattice.kernels.iter().map(|k| json!(k.terms.first().map(|t| t.length_scale))).collect();
+                let value = json!({
+                    "shape": lattice.shape,
+                    "length_scale": lengths,
+                    "signal_variance": lattice.signal_variance,
+                    "noise_variance": lattice.noise_variance,
+                    "space": lattice.space,
+                });
+                let name = lattice.kernels[0].terms.first().map_or("", |t| t.shape.name());
+                (format!("product of {name} along u, v, phi"), value)
+            });
+            let all: Vec<(String, Value)> = each.collect();
+            let kernel = all.first().map_or_else(String::new, |(name, _)| name.clone());
+            let components: Vec<Value> = all.into_iter().map(|(_, value)| value).collect();
+            return ("inducing", kernel, json!({ "mix": gp.mix, "components": components }));
         }
         _ => ("unknown", vec![(String::new(), Value::Null)]),
     };

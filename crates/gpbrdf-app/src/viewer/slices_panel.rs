@@ -140,8 +140,8 @@ impl Viewer {
             .show_y(false)
             .show_grid(false)
             .clamp_grid(true)
-            .x_grid_spacer(|input| degrees_marks(input, false))
-            .y_grid_spacer(|input| degrees_marks(input, false))
+            .x_grid_spacer(|input| degrees_marks(&input))
+            .y_grid_spacer(|input| degrees_marks(&input))
             .label_formatter(|_| None)
             .custom_x_axes(vec![
                 AxisHints::new_x()
@@ -216,7 +216,7 @@ pub(crate) fn zoom(plot: &mut PlotUi<'_>) {
 }
 
 /// Marks every 15 or 30 degrees.
-fn degrees_marks(input: GridInput, _square: bool) -> Vec<GridMark> {
+fn degrees_marks(input: &GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let step = if high - low < 40.0 { 5.0 } else { 30.0 };
     (0..=18)

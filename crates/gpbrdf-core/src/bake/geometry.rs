@@ -107,8 +107,8 @@ mod tests {
     #[test]
     fn cells_stand_where_the_space_says() {
         for space in [
-            InputSpace::WarpedBox { density: 1.3, v_density: 0.65, symmetry: Symmetry::Bilateral },
-            InputSpace::WarpedBox { density: 1.0, v_density: 1.0, symmetry: Symmetry::Reciprocal },
+            InputSpace::WarpedBox { density: 1.3, v_density: 0.65, symmetry: Symmetry::Bilateral, tail: 1.7 },
+            InputSpace::WarpedBox { density: 1.0, v_density: 1.0, symmetry: Symmetry::Reciprocal, tail: 1.0 },
             InputSpace::HalfDiff,
         ] {
             let geometry = TableGeometry::new(space);

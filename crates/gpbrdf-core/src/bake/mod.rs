@@ -2,6 +2,7 @@
 
 mod dense;
 mod geometry;
+mod inducing;
 mod lattice;
 mod separable;
 
@@ -48,6 +49,9 @@ impl SigmaTable {
 /// A lattice model takes tens of milliseconds; a dense one sums `n` kernel values a cell.
 #[must_use]
 pub fn bake_mean(model: &Model) -> BrdfTable {
+    if let Process::Inducing(gp) = &model.process {
+        return inducing::bake_mean(model, gp);
+    }
     let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space)
     else {
         return dense::bake_mean(model);
@@ -76,6 +80,9 @@ pub fn bake_mean(model: &Model) -> BrdfTable {
 /// interpolated between.
 #[must_use]
 pub fn bake_sigma(model: &Model) -> SigmaTable {
+    if let Process::Inducing(gp) = &model.process {
+        return inducing::bake_sigma(gp);
+    }
     let (Process::Lattice(groups), InputSpace::WarpedBox { symmetry, .. }) = (&model.process, model.space)
     else {
         return dense::bake_sigma(model);
