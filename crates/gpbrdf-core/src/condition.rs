@@ -172,7 +172,7 @@ fn lattice_data(lattice: &LatticeLayout, targets: &[Vec<f64>]) -> LatticeData {
         coordinates: [
             u.into_iter().map(|u| space.warp_u(u)).collect(),
             v.into_iter().map(|v| space.warp_v(v)).collect(),
-            phi,
+            phi.into_iter().map(|phi| space.warp_phi(phi)).collect(),
         ],
         metrics: space.lattice_metrics(),
         mirrored: space.mirrored(),

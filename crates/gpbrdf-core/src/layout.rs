@@ -38,6 +38,15 @@ pub struct LatticeLayout {
     pub v_max: f64,
     /// Symmetry in `phi_d`.
     pub symmetry: Symmetry,
+    /// Exponent of the nodes along a folded `phi`: `phi = pi/2 (1 - (1 - t)^phi_density)`; above 1 the nodes crowd towards
+    /// `phi_d = pi/2`.
+    #[serde(default = "even")]
+    pub phi_density: f64,
+}
+
+/// Nodes of files that say nothing.
+fn even() -> f64 {
+    1.0
 }
 
 impl Default for LatticeLayout {
@@ -50,9 +59,13 @@ impl Default for LatticeLayout {
             v_density: 0.65,
             v_max: 0.97,
             symmetry: Symmetry::Bilateral,
+            phi_density: 1.5,
         }
     }
 }
+
+/// How the sides of a lattice grow with its number of samples; the powers add up to 1.
+const SAMPLE_POWERS: [f64; 3] = [0.31, 0.31, 0.38];
 
 impl LatticeLayout {
     /// Number of nodes.
@@ -67,14 +80,17 @@ impl LatticeLayout {
         self.len() == 0
     }
 
-    /// A lattice of this shape. With few nodes along `u` they spread less: `node_spread = 1 + A / 32`, at most 3.
+    /// A lattice of this shape. Few nodes spread and crowd less: `node_spread = 1 + A / 32`, at most 3, and
+    /// `phi_density = 1 + C / 16`, at most 1.5.
     #[must_use]
     pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
         let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
-        Self { shape, node_spread, symmetry, ..Self::default() }
+        let phi_density = (1.0 + shape[2] as f64 / 16.0).min(1.5);
+        Self { shape, node_spread, phi_density, symmetry, ..Self::default() }
     }
 
-    /// A lattice with the proportions of the default one and about `samples` nodes.
+    /// A lattice with about `samples` nodes, that of the default one in its proportions; with fewer samples the nodes
+    /// along `phi` thin out most, as the power 0.38 of their number, the others as the power 0.31.
     ///
     /// # Errors
     /// Fewer than 12 samples.
@@ -86,8 +102,8 @@ impl LatticeLayout {
         // The circle is twice as long as the folded interval.
         let stretch = if symmetry == Symmetry::Reciprocal { 2.0 } else { 1.0 };
         let reference = [reference[0], reference[1], reference[2] * stretch];
-        let scale = (samples as f64 / reference.iter().product::<f64>()).cbrt();
-        let ideal = reference.map(|n| n * scale);
+        let scale = samples as f64 / reference.iter().product::<f64>();
+        let ideal = [0, 1, 2].map(|k| reference[k] * scale.powf(SAMPLE_POWERS[k]));
         // Among the roundings of the three sides, the product nearest to the request.
         let mut best = ([2, 2, 2], f64::INFINITY);
         for corner in 0..8 {
@@ -125,6 +141,9 @@ impl LatticeLayout {
         if !(self.v_density >= 0.25 && self.v_density <= 4.0) {
             return Err(Error::argument("node density along v", "0.25 to 4", self.v_density));
         }
+        if !(self.phi_density >= 0.25 && self.phi_density <= 4.0) {
+            return Err(Error::argument("node density along phi", "0.25 to 4", self.phi_density));
+        }
         if !(self.v_max > 0.1 && self.v_max <= 1.0) {
             return Err(Error::argument("v_max", "0.1 to 1", self.v_max));
         }
@@ -139,6 +158,7 @@ impl LatticeLayout {
             v_density: self.v_density,
             symmetry: self.symmetry,
             tail: 1.0,
+            phi_density: self.phi_density,
         }
     }
 
@@ -159,7 +179,9 @@ impl LatticeLayout {
             Symmetry::Bilateral => FRAC_PI_2,
             Symmetry::Reciprocal => PI,
         };
-        let phi = (0..self.shape[2]).map(|i| (i as f64 + 0.5) / c * period).collect();
+        let phi_density = if self.symmetry == Symmetry::Bilateral { self.phi_density } else { 1.0 };
+        let place = |t: f64| period * (1.0 - (1.0 - t).powf(phi_density));
+        let phi = (0..self.shape[2]).map(|i| place((i as f64 + 0.5) / c)).collect();
         [u, v, phi]
     }
 

@@ -14,8 +14,8 @@ use crate::layout::Symmetry;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum InputSpace {
-    /// The warped box, stretched where nodes crowd: `(1 - (1 - u^(1/density))^tail, min(v, 1)^(1/v_density), phi)`.
-    /// Directions below the horizon stand for the horizon. The first is the distribution function of P. Kumaraswamy
+    /// The warped box, stretched where nodes crowd: `(1 - (1 - u^(1/density))^tail, min(v, 1)^(1/v_density), phi)`, with
+    /// a folded `phi` as in [`InputSpace::warp_phi`]. Directions below the horizon stand for the horizon. The first is the distribution function of P. Kumaraswamy
     /// (1980), as in J. Snoek et al., "Input Warping for Bayesian Optimization" (2014); a power where `tail` is 1.
     WarpedBox {
         /// Exponent of the warp along `u`.
@@ -27,6 +27,9 @@ pub enum InputSpace {
         /// Second exponent of the warp along `u`: below 1 nodes crowd towards `theta_h = pi/2`, above 1 they thin out.
         #[serde(default = "one")]
         tail: f64,
+        /// Exponent of the warp along a folded `phi`; above 1 nodes crowd towards `phi = pi/2`.
+        #[serde(default = "one")]
+        phi_density: f64,
     },
     /// `(theta_h, theta_d, phi_d)` in radians, as they are: the paper's own setting.
     HalfDiff,
@@ -43,7 +46,7 @@ impl InputSpace {
                 if symmetry == Symmetry::Bilateral {
                     point = point.folded_bilateral();
                 }
-                [self.warp_u(point.u), self.warp_v(point.v), point.phi]
+                [self.warp_u(point.u), self.warp_v(point.v), self.warp_phi(point.phi)]
             }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
@@ -55,8 +58,10 @@ impl InputSpace {
     /// A density that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         match self {
-            Self::WarpedBox { density, v_density, tail, .. } => {
-                let bad = [density, v_density, tail].into_iter().find(|x| !(*x > 0.0 && x.is_finite()));
+            Self::WarpedBox { density, v_density, tail, phi_density, .. } => {
+                let bad = [density, v_density, tail, phi_density]
+                    .into_iter()
+                    .find(|x| !(*x > 0.0 && x.is_finite()));
                 bad.map_or(Ok(()), |x| Err(Error::argument("node density", "a positive number", x)))
             }
             Self::HalfDiff => Ok(()),
@@ -85,6 +90,23 @@ impl InputSpace {
         }
     }
 
+    /// The third coordinate at `phi`, folded to `[0, pi/2]` in a bilateral box: `pi/2 (1 - (1 - phi / (pi/2))^(1/p))` there
+    /// with `p = phi_density`, else `phi` itself.
+    ///
+    /// `theta_d_max` has a kink in `phi` at `pi/2`, where it goes with `|cos phi_d|`, and so has everything that is smooth
+    /// in `theta_d` when it is seen along `v`. In this coordinate the kink is a power of `p`: nearly the even function that
+    /// the mirrored kernel expects.
+    #[must_use]
+    pub fn warp_phi(self, phi: f64) -> f64 {
+        match self {
+            // Left as it is where there is nothing to do, to the last bit.
+            Self::WarpedBox { symmetry: Symmetry::Bilateral, phi_density, .. } if phi_density != 1.0 => {
+                FRAC_PI_2 * (1.0 - (1.0 - phi / FRAC_PI_2).max(0.0).powf(phi_density.recip()))
+            }
+            _ => phi,
+        }
+    }
+
     /// Whether functions of each coordinate are even, about 0 and with the period of a chord: on a folded `phi` they
     /// are.
     #[must_use]
@@ -110,7 +132,7 @@ impl InputSpace {
     }
 }
 
-/// The tail of files that have none.
+/// The tail and the density along `phi` of files that have none.
 fn one() -> f64 {
     1.0
 }
@@ -122,13 +144,28 @@ mod tests {
 
     #[test]
     fn warped_box_folds_and_stops_at_the_horizon() {
-        let folded =
-            InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Bilateral, tail: 1.0 };
-        let circle =
-            InputSpace::WarpedBox { density: 1.5, v_density: 0.8, symmetry: Symmetry::Reciprocal, tail: 1.0 };
+        let folded = InputSpace::WarpedBox {
+            density: 1.5,
+            v_density: 0.8,
+            symmetry: Symmetry::Bilateral,
+            tail: 1.0,
+            phi_density: 1.0,
+        };
+        let circle = InputSpace::WarpedBox {
+            density: 1.5,
+            v_density: 0.8,
+            symmetry: Symmetry::Reciprocal,
+            tail: 1.0,
+            phi_density: 1.0,
+        };
         let angles = HalfDiff { theta_h: 0.4, theta_d: 0.3, phi_d: 2.0 };
-        let tailed =
-            InputSpace::WarpedBox { density: 1.0, v_density: 1.0, symmetry: Symmetry::Bilateral, tail: 2.0 };
+        let tailed = InputSpace::WarpedBox {
+            density: 1.0,
+            v_density: 1.0,
+            symmetry: Symmetry::Bilateral,
+            tail: 2.0,
+            phi_density: 1.0,
+        };
         assert!(
             (tailed.warp_u(0.3) - 0.51).abs() < 1e-15
                 && tailed.warp_u(1.0) == 1.0

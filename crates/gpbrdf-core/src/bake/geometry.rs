@@ -50,7 +50,7 @@ impl TableGeometry {
         let limit = if warped { 1.0 } else { f64::INFINITY };
         let above = |scale: &f64| second.iter().take_while(|x| **x * scale < limit).count();
         let distinct = scale.iter().map(|scale| (above(scale) + 1).min(N_THETA_D)).collect();
-        let third = (0..rows).map(|p| cell_center(0, 0, p).phi_d).collect();
+        let third = (0..rows).map(|p| space.warp_phi(cell_center(0, 0, p).phi_d)).collect();
         Self { first, second, third, scale, distinct, limit }
     }
 
@@ -107,8 +107,20 @@ mod tests {
     #[test]
     fn cells_stand_where_the_space_says() {
         for space in [
-            InputSpace::WarpedBox { density: 1.3, v_density: 0.65, symmetry: Symmetry::Bilateral, tail: 1.7 },
-            InputSpace::WarpedBox { density: 1.0, v_density: 1.0, symmetry: Symmetry::Reciprocal, tail: 1.0 },
+            InputSpace::WarpedBox {
+                density: 1.3,
+                v_density: 0.65,
+                symmetry: Symmetry::Bilateral,
+                tail: 1.7,
+                phi_density: 1.4,
+            },
+            InputSpace::WarpedBox {
+                density: 1.0,
+                v_density: 1.0,
+                symmetry: Symmetry::Reciprocal,
+                tail: 1.0,
+                phi_density: 1.4,
+            },
             InputSpace::HalfDiff,
         ] {
             let geometry = TableGeometry::new(space);

@@ -20,6 +20,9 @@ const REGRESSION_RATIO: f64 = 1e-5;
 /// Shapes are searched up to this many numbers; larger lattices keep the proportions found there.
 const LARGEST_SEARCH: usize = 1400;
 
+/// The density of nodes along a folded `phi`, as in the layout of samples.
+const PHI_DENSITY: f64 = 1.5;
+
 /// Largest sides: half of the table's cells along each axis, and all along `theta_h`.
 const LARGEST_SIDES: [usize; 3] = [90, 60, 30];
 
@@ -74,7 +77,13 @@ impl Candidate {
         let p = self.logs.map(f64::exp);
         InducingShape {
             shape: self.shape,
-            space: InputSpace::WarpedBox { density: p[3], v_density: p[4], tail: p[5], symmetry },
+            space: InputSpace::WarpedBox {
+                density: p[3],
+                v_density: p[4],
+                tail: p[5],
+                symmetry,
+                phi_density: PHI_DENSITY,
+            },
             kernels: [p[0], p[1], p[2]].map(|length| Kernel1d::new(kernel, length)),
             signal_variance: 1.0,
             noise_variance: 1.0,
@@ -200,7 +209,8 @@ type Step = (Candidate, f64);
 fn regress_on(lattice: &InducingShape, data: &GridData, component: usize, ratio: f64) -> Result<Regression> {
     let u: Vec<f64> = data.u.iter().map(|&u| lattice.space.warp_u(u)).collect();
     let v: Vec<f64> = data.v.iter().map(|&v| lattice.space.warp_v(v)).collect();
-    let axes = lattice.cardinal([&u, &v, &data.phi])?;
+    let phi: Vec<f64> = data.phi.iter().map(|&phi| lattice.space.warp_phi(phi)).collect();
+    let axes = lattice.cardinal([&u, &v, &phi])?;
     regress(axes.each_ref(), &data.weights, &data.components[component], ratio)
 }
 
@@ -389,7 +399,7 @@ fn prior_trace(lattice: &InducingShape, data: &GridData) -> f64 {
         let image = if mirrored[k] { kernel.value(metrics[k].distance(x, -x)) } else { 0.0 };
         kernel.value(0.0) + image
     };
-    let along_phi: Vec<f64> = data.phi.iter().map(|&x| variance(2, x)).collect();
+    let along_phi: Vec<f64> = data.phi.iter().map(|&phi| variance(2, lattice.space.warp_phi(phi))).collect();
     let rest = variance(0, 0.0) * variance(1, 0.0);
     data.weights
         .chunks(along_phi.len())
@@ -444,8 +454,13 @@ mod tests {
     }
 
     fn lattice(shape: [usize; 3]) -> InducingShape {
-        let space =
-            InputSpace::WarpedBox { density: 1.4, v_density: 0.8, tail: 1.3, symmetry: Symmetry::Bilateral };
+        let space = InputSpace::WarpedBox {
+            density: 1.4,
+            v_density: 0.8,
+            tail: 1.3,
+            symmetry: Symmetry::Bilateral,
+            phi_density: 1.2,
+        };
         let kernels = [0.4, 0.6, 0.8].map(|length| Kernel1d::new(Shape::Matern52, length));
         InducingShape { shape, space, kernels, signal_variance: 0.7, noise_variance: 0.02 }
     }
@@ -458,7 +473,7 @@ mod tests {
         let points = [
             data.u.iter().map(|&u| lattice.space.warp_u(u)).collect::<Vec<_>>(),
             data.v.iter().map(|&v| lattice.space.warp_v(v)).collect(),
-            data.phi.clone(),
+            data.phi.iter().map(|&phi| lattice.space.warp_phi(phi)).collect(),
         ];
         let nodes = lattice.nodes();
         let (metrics, mirrored) = (lattice.space.lattice_metrics(), lattice.space.mirrored());
