@@ -19,6 +19,11 @@ use gpbrdf_render::{
 /// What was logged at the level of a warning or above.
 static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
+/// What is not about this crate: no layer, one that is older than the number of WGSL among the languages of SPIR-V's debug
+/// information (`WGPU_DEBUG=0` leaves that out), and graphics libraries that are looked at and not taken.
+const FOREIGN: [&str; 3] =
+    ["unable to find layer", "Invalid source language operand: 10", "wgpu_hal::gles::egl"];
+
 struct Logger;
 
 impl log::Log for Logger {
@@ -126,8 +131,8 @@ fn a_run_of_everything_raises_no_warning() {
     render_all(&context, &models[0]);
     context.wait("test").unwrap();
     let all = std::mem::take(&mut *WARNINGS.lock().unwrap());
-    let (missing, raised): (Vec<String>, Vec<String>) =
-        all.into_iter().partition(|text| text.contains("unable to find layer"));
-    missing.iter().for_each(|text| eprintln!("{text}"));
+    let (known, raised): (Vec<String>, Vec<String>) =
+        all.into_iter().partition(|text| FOREIGN.iter().any(|part| text.contains(part)));
+    known.iter().for_each(|text| eprintln!("{text}"));
     assert!(raised.is_empty(), "{}", raised.join("\n"));
 }

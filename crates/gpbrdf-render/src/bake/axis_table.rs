@@ -5,9 +5,9 @@ use gpbrdf_core::SeparableForm;
 use super::narrow;
 
 /// Largest error of a cubic, as a share of the largest value of its function.
-const TOLERANCE: f64 = 3e-7;
+const TOLERANCE: f64 = 4e-6;
 /// Largest error of the residual deviation, as a share of the prior one.
-const DEVIATION_TOLERANCE: f64 = 2e-6;
+const DEVIATION_TOLERANCE: f64 = 2e-5;
 /// Most cubics between two breaks.
 const MOST_PIECES: usize = 64;
 /// Where each cubic interpolates.
@@ -86,6 +86,7 @@ impl AxisTable {
                 error[..deviation].iter().zip(&largest).all(|(error, largest)| *error <= TOLERANCE * largest)
                     && error[deviation] <= DEVIATION_TOLERANCE * prior.sqrt();
             if good || pieces >= MOST_PIECES {
+                eprintln!("TMP {pieces}");
                 return Self {
                     breaks: breaks.into_iter().map(narrow).collect(),
                     pieces,
