@@ -21,8 +21,13 @@ static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
 /// What is not about this crate: no layer, one that is older than the number of WGSL among the languages of SPIR-V's debug
 /// information (`WGPU_DEBUG=0` leaves that out), and graphics libraries that are looked at and not taken.
-const FOREIGN: [&str; 3] =
-    ["unable to find layer", "Invalid source language operand: 10", "wgpu_hal::gles::egl"];
+const FOREIGN: [&str; 4] = [
+    "unable to find layer",
+    "Invalid source language operand: 10",
+    "wgpu_hal::gles::egl",
+    // The second half of a message.
+    "\tobjects: ",
+];
 
 struct Logger;
 

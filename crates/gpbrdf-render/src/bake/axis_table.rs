@@ -86,7 +86,6 @@ impl AxisTable {
                 error[..deviation].iter().zip(&largest).all(|(error, largest)| *error <= TOLERANCE * largest)
                     && error[deviation] <= DEVIATION_TOLERANCE * prior.sqrt();
             if good || pieces >= MOST_PIECES {
-                eprintln!("TMP {pieces}");
                 return Self {
                     breaks: breaks.into_iter().map(narrow).collect(),
                     pieces,
