@@ -109,6 +109,10 @@ impl Baker {
     /// # Errors
     /// Those of [`Baker::bake`].
     pub fn bake_into(&self, model: &Model, texture: &BrdfTexture, progress: &mut Progress<'_>) -> Result<()> {
+        // Its layers stay black there, with no error.
+        if self.context.info().backend == wgpu::Backend::Gl {
+            return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
+        }
         let targets = Targets::new(&self.context, model)?;
         let mut first_channel = 0;
         match &model.process {
