@@ -21,10 +21,15 @@ struct Corner {
     @location(1) normal: vec3f,
 }
 
+// Bits of floats: integers are a colour on every device, 32-bit floats are not.
 struct Texels {
-    @location(0) position: vec4f,
-    // The fourth component is 1 where there is something.
-    @location(1) normal: vec4f,
+    @location(0) position: vec4u,
+    // The fourth component is 1.0 where there is something.
+    @location(1) normal: vec4u,
+}
+
+fn texels(position: vec3f, normal: vec3f) -> Texels {
+    return Texels(bitcast<vec4u>(vec4f(position, 1.0)), bitcast<vec4u>(vec4f(normal, 1.0)));
 }
 
 @vertex
@@ -61,7 +66,7 @@ fn mesh_texels(corner: Corner) -> Texels {
     if cosine < LEAST_COSINE {
         normal = normalize(normal + (LEAST_COSINE - cosine) * to_viewer);
     }
-    return Texels(vec4f(position, 1.0), vec4f(normal, 1.0));
+    return texels(position, normal);
 }
 
 @vertex
@@ -88,5 +93,5 @@ fn sphere_texels(@builtin(position) pixel: vec4f) -> Texels {
         discard;
     }
     let normal = normalize(nearest - sqrt(square) * along);
-    return Texels(vec4f(normal, 1.0), vec4f(normal, 1.0));
+    return texels(normal, normal);
 }

@@ -33,8 +33,8 @@ const VIEW_BINS: u32 = 64u;
 const RINGS: u32 = 90u;
 
 @group(0) @binding(0) var<uniform> shade: Shade;
-@group(0) @binding(1) var positions: texture_2d<f32>;
-@group(0) @binding(2) var normals: texture_2d<f32>;
+@group(0) @binding(1) var positions: texture_2d<u32>;
+@group(0) @binding(2) var normals: texture_2d<u32>;
 @group(0) @binding(3) var truth: texture_3d<f32>;
 @group(0) @binding(4) var prediction: texture_3d<f32>;
 // Radiance and, in alpha, the density of directions in 1/sr.
@@ -249,11 +249,11 @@ fn shade_pixels(@builtin(global_invocation_id) id: vec3u) {
     if pixel.x >= shade.size.x || pixel.y >= shade.size.y {
         return;
     }
-    let normal = textureLoad(normals, pixel, 0);
+    let normal = bitcast<vec4f>(textureLoad(normals, pixel, 0));
     if normal.w == 0.0 {
         return;
     }
-    let position = textureLoad(positions, pixel, 0).xyz;
+    let position = bitcast<vec4f>(textureLoad(positions, pixel, 0)).xyz;
     var to_viewer = shade.viewer.xyz;
     if shade.viewer.w > 0.0 {
         to_viewer = normalize(shade.viewer.xyz - position);

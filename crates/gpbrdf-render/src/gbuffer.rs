@@ -8,8 +8,9 @@ use crate::mesh::Mesh;
 
 pub(crate) const GBUFFER_WGSL: &str = include_str!("../shaders/gbuffer.wgsl");
 
-/// 32 bytes a pixel for both, what every device takes as colours of one pass.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+/// The bits of 32-bit floats, as OpenGL renders to those on request only. 32 bytes a pixel for both textures, what every
+/// device takes as colours of one pass.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 const WHAT: &str = "G-buffer";
 

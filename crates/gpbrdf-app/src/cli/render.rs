@@ -8,8 +8,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::{
     AtomicFile, BrdfTable, Colormap, Content, Panel, Picture, PixelDifference, Scale, SigmaTable, Source,
-    bake_mean, bake_sigma, exposure_of, panel_figure, psnr, round_limit, ssim, write_image_exr,
-    write_rgba_png,
+    exposure_of, panel_figure, psnr, round_limit, ssim, write_image_exr, write_rgba_png,
 };
 use gpbrdf_render::{
     AdapterChoice, Background, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh,
@@ -17,6 +16,7 @@ use gpbrdf_render::{
 };
 use serde_json::{Value, json};
 
+use super::backend::{BackendArgs, Baked};
 use super::input::{environment, open};
 use super::model_args::ModelArgs;
 use super::report::{Seconds, significant};
@@ -80,6 +80,8 @@ pub(crate) struct Render {
     compare: bool,
     #[command(flatten)]
     model: ModelArgs,
+    #[command(flatten)]
+    backend: BackendArgs,
     /// Print JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -313,13 +315,14 @@ impl Render {
         let prediction = if !needs_prediction {
             None
         } else if let Content::Model(model) = &source.content {
-            Some(terminal.stage("baking", || (bake_mean(model), bake_sigma(model))))
+            Some(self.backend.bake(model, true, seconds, terminal)?)
         } else {
             let (model, _) = self.model.sample_and_fit(source, seconds, terminal)?;
-            Some(
-                seconds
-                    .measure("bake", || terminal.stage("baking", || (bake_mean(&model), bake_sigma(&model)))),
-            )
+            Some(self.backend.bake(&model, true, seconds, terminal)?)
+        };
+        let prediction = match prediction {
+            Some(Baked { mean, sigma: Some(sigma), .. }) => Some((mean, sigma)),
+            _ => None,
         };
         Ok(Materials { truth, prediction })
     }

@@ -13,13 +13,15 @@ struct Lattice {
     // Offsets: what depends on theta_d in the second coordinate, on the column, how many cells of a column are distinct,
     // and the breaks of the piecewise cubics.
     second: vec4u,
-    // Intervals between breaks, and cubics in each interval.
+    // Intervals between breaks, and cubics in each interval, even in its graded coordinate.
     pieces: vec2u,
     signal_variance: f32,
     // Prior variance along theta_d.
     second_prior: f32,
     // Largest second coordinate.
     limit: f32,
+    // Components of inducing lattices: what this variance adds to that of each channel.
+    share: vec4f,
 }
 
 const N_THETA_H: u32 = 90u;
@@ -28,7 +30,7 @@ const N_PHI_D: u32 = 180u;
 
 @group(0) @binding(0) var<uniform> lattice: Lattice;
 @group(0) @binding(1) var<storage, read> tables: array<f32>;
-// Cubics `dot(vec4(1, x, x^2, x^3), cubic)` with x in [0, 1]: of each function and, last, of the residual variance.
+// Cubics `dot(vec4(1, x, x^2, x^3), cubic)` with x in [0, 1]: of each function and, last, of the residual deviation.
 @group(0) @binding(2) var<storage, read> cubics: array<vec4f>;
 @group(0) @binding(3) var<storage, read> operand: array<vec4f>;
 @group(0) @binding(4) var<storage, read_write> result: array<vec4f>;
@@ -69,17 +71,25 @@ fn contract_third(@builtin(global_invocation_id) id: vec3u) {
     result[(id.z * rows + id.y) * b + id.x] = sum;
 }
 
-// operand: [i_theta_h][row][b]; result: targets [i_theta_h][row][i_theta_d], to which the means are added; w takes the
-// larger standard deviation.
-@compute @workgroup_size(32, 2)
-fn evaluate_second(@builtin(global_invocation_id) id: vec3u) {
+struct Evaluated {
+    // Whether the cell has a place of its own.
+    distinct: bool,
+    // Of the cell in the targets.
+    cell: u32,
+    mean: vec3f,
+    variance: f32,
+}
+
+// operand: [i_theta_h][row][b].
+fn evaluate(id: vec3u) -> Evaluated {
+    var found: Evaluated;
     let rows = lattice.shape.w;
     if id.x >= N_THETA_D || id.y >= rows || id.z >= N_THETA_H {
-        return;
+        return found;
     }
     let column = id.z * (N_PHI_D / 2u) + min(id.y, N_PHI_D - 1u - id.y);
     if f32(id.x) >= tables[lattice.second.z + column] {
-        return;
+        return found;
     }
     let t = min(tables[lattice.second.x + id.x] * tables[lattice.second.y + column], lattice.limit);
 
@@ -94,9 +104,14 @@ fn evaluate_second(@builtin(global_invocation_id) id: vec3u) {
             high = middle;
         }
     }
+    // Pieces crowd quadratically towards both ends, from where the distance is taken: there the functions may have kinks.
     let begin = tables[lattice.second.w + low];
     let end = tables[lattice.second.w + low + 1u];
-    let position = clamp((t - begin) / (end - begin), 0.0, 1.0) * f32(lattice.pieces.y);
+    let width = end - begin;
+    let root = sqrt(clamp(0.5 * min(t - begin, end - t) / width, 0.0, 0.25));
+    let upper = t - begin > end - t;
+    let count = f32(lattice.pieces.y);
+    let position = select(root * count, count - root * count, upper);
     let piece = min(u32(position), lattice.pieces.y - 1u);
     let x = position - f32(piece);
     let powers = vec4f(1.0, x, x * x, x * x * x);
@@ -109,7 +124,8 @@ fn evaluate_second(@builtin(global_invocation_id) id: vec3u) {
         sum = accumulate(sum, dot(powers, cubics[first_cubic + b]), operand[row * functions + b]);
     }
 
-    let residual = max(dot(powers, cubics[first_cubic + functions]), 0.0);
+    let deviation = dot(powers, cubics[first_cubic + functions]);
+    let residual = deviation * deviation;
     let first_prior = tables[lattice.first.y + 2u * id.z];
     let first_residual = tables[lattice.first.y + 2u * id.z + 1u];
     let third_prior = tables[lattice.third.y + 2u * id.y];
@@ -119,7 +135,45 @@ fn evaluate_second(@builtin(global_invocation_id) id: vec3u) {
     let variance = sum.w + first_residual * lattice.second_prior * third_prior
         + first_explained * (residual * third_prior + second_explained * third_residual);
 
-    let cell = row * N_THETA_D + id.x;
-    let before = result[cell];
-    result[cell] = vec4f(before.xyz + sum.xyz, max(before.w, sqrt(max(lattice.signal_variance * variance, 0.0))));
+    found.distinct = true;
+    found.cell = row * N_THETA_D + id.x;
+    found.mean = sum.xyz;
+    found.variance = max(lattice.signal_variance * variance, 0.0);
+    return found;
+}
+
+// result: targets [i_theta_h][row][i_theta_d], to which the means are added; w takes the larger standard deviation.
+@compute @workgroup_size(32, 2)
+fn evaluate_second(@builtin(global_invocation_id) id: vec3u) {
+    let found = evaluate(id);
+    if found.distinct {
+        let before = result[found.cell];
+        result[found.cell] = vec4f(before.xyz + found.mean, max(before.w, sqrt(found.variance)));
+    }
+}
+
+// Targets: as many again hold the variances of the channels.
+fn cells() -> u32 {
+    return N_THETA_H * lattice.shape.w * N_THETA_D;
+}
+
+// result: targets, to which the means are added, then variances, to which the shares of this one are.
+@compute @workgroup_size(32, 2)
+fn evaluate_component(@builtin(global_invocation_id) id: vec3u) {
+    let found = evaluate(id);
+    if found.distinct {
+        result[found.cell] += vec4f(found.mean, 0.0);
+        result[cells() + found.cell] += lattice.share * found.variance;
+    }
+}
+
+// result: targets, whose w becomes the largest standard deviation of the three channels, then variances.
+@compute @workgroup_size(32, 2)
+fn largest_deviation(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= N_THETA_D || id.y >= lattice.shape.w || id.z >= N_THETA_H {
+        return;
+    }
+    let cell = (id.z * lattice.shape.w + id.y) * N_THETA_D + id.x;
+    let variance = result[cells() + cell];
+    result[cell].w = sqrt(max(variance.x, max(variance.y, variance.z)));
 }

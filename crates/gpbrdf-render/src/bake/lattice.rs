@@ -1,6 +1,6 @@
 //! The bake of a lattice process.
 
-use gpbrdf_core::{LatticeGp, N_THETA_D, N_THETA_H, SeparableForm};
+use gpbrdf_core::{InducingGp, LatticeGp, N_THETA_D, N_THETA_H, SeparableForm, TableGeometry};
 use wgpu::BufferUsages;
 
 use super::axis_table::AxisTable;
@@ -9,12 +9,24 @@ use super::{LATTICE_WGSL, Targets, narrow, to_u32};
 use crate::context::Context;
 use crate::error::Result;
 
-/// The three steps.
+const WHAT: &str = "bake: lattice";
+
+/// The three steps, and what inducing lattices take in place of the last.
 #[derive(Debug)]
 pub(super) struct Pipelines {
     first: wgpu::ComputePipeline,
     third: wgpu::ComputePipeline,
     second: wgpu::ComputePipeline,
+    component: wgpu::ComputePipeline,
+    deviation: wgpu::ComputePipeline,
+}
+
+/// How a process adds to the targets.
+enum Part {
+    /// Its channels are those of the targets from this one on; sigma is the largest of all parts.
+    Channels(usize),
+    /// Its one channel is mixed into all three, so that variances add up.
+    Component([f64; 3]),
 }
 
 /// Numbers of one buffer, and where each part starts.
@@ -36,6 +48,8 @@ impl Pipelines {
             first: pipeline("contract_first")?,
             third: pipeline("contract_third")?,
             second: pipeline("evaluate_second")?,
+            component: pipeline("evaluate_component")?,
+            deviation: pipeline("largest_deviation")?,
         })
     }
 
@@ -49,10 +63,42 @@ impl Pipelines {
         targets: &Targets,
         first_channel: usize,
     ) -> Result<()> {
-        const WHAT: &str = "bake: lattice";
+        self.add_part(context, gp, &targets.geometry, targets, &Part::Channels(first_channel)).map(|_| ())
+    }
+
+    /// Adds component `k` of `gp` to the targets: the mean times its colour, and its variance times the squares of that to
+    /// the variances of the channels. The last component turns those into sigma.
+    pub(super) fn add_component(
+        &self,
+        context: &Context,
+        gp: &InducingGp,
+        k: usize,
+        targets: &Targets,
+    ) -> Result<()> {
+        let Some(component) = gp.components.get(k) else { return Ok(()) };
+        let geometry = TableGeometry::new(component.lattice().space);
+        let part = Part::Component(gp.mix.map(|row| row[k]));
+        let uniform = self.add_part(context, component.gp(), &geometry, targets, &part)?;
+        if k + 1 < gp.components.len() {
+            return Ok(());
+        }
+        context.guard(WHAT, || {
+            let group = context.bind_buffers(&self.deviation, &[(0, &uniform), (4, &targets.buffer)]);
+            context.dispatch(&self.deviation, &group, cells(geometry.third().len()));
+        })
+    }
+
+    /// Adds one process; the answer is its uniform.
+    fn add_part(
+        &self,
+        context: &Context,
+        gp: &LatticeGp,
+        geometry: &TableGeometry,
+        targets: &Targets,
+        part: &Part,
+    ) -> Result<wgpu::Buffer> {
         let form = SeparableForm::new(gp);
         let [a, b, c] = form.shape();
-        let geometry = &targets.geometry;
         let rows = geometry.third().len();
         let axis = AxisTable::new(&form, &gp.data().coordinates[1]);
 
@@ -80,13 +126,20 @@ impl Pipelines {
             second_prior: narrow(axis.prior),
             limit: narrow(geometry.limit().min(f64::from(f32::MAX))),
             padding: [0.0; 3],
+            share: match part {
+                Part::Channels(_) => [0.0; 4],
+                Part::Component([r, g, b]) => [r * r, g * g, b * b, 0.0].map(narrow),
+            },
         };
         let nodes = a * b * c;
         let mut coefficients: Vec<[f32; 4]> =
             form.unexplained().iter().map(|&x| [0.0, 0.0, 0.0, narrow(x)]).collect();
         for (channel, tensor) in form.coefficients().chunks(nodes).enumerate() {
             for (out, &x) in coefficients.iter_mut().zip(tensor) {
-                out[first_channel + channel] = narrow(x);
+                match part {
+                    Part::Channels(first) => out[first + channel] = narrow(x),
+                    Part::Component(colour) => (0..3).for_each(|c| out[c] = narrow(colour[c] * x)),
+                }
             }
         }
 
@@ -106,14 +159,27 @@ impl Pipelines {
                     let group = context.bind_buffers(pipeline, &bindings);
                     context.dispatch(pipeline, &group, count);
                 };
-            let groups = |count: usize, size: usize| to_u32(count.div_ceil(size));
             let slabs = to_u32(N_THETA_H);
             step(&self.first, &coefficients, &along_first, [groups(b * c, 64), slabs, 1]);
             step(&self.third, &along_first, &along_both, [groups(b, 8), groups(rows, 8), slabs]);
             let bindings =
                 [(0, &uniform), (1, &tables), (2, &cubics), (3, &along_both), (4, &targets.buffer)];
-            let group = context.bind_buffers(&self.second, &bindings);
-            context.dispatch(&self.second, &group, [groups(N_THETA_D, 32), groups(rows, 2), slabs]);
-        })
+            let pipeline = match part {
+                Part::Channels(_) => &self.second,
+                Part::Component(_) => &self.component,
+            };
+            let group = context.bind_buffers(pipeline, &bindings);
+            context.dispatch(pipeline, &group, cells(rows));
+        })?;
+        Ok(uniform)
     }
+}
+
+/// Workgroups for one invocation a target.
+fn cells(rows: usize) -> [u32; 3] {
+    [groups(N_THETA_D, 32), groups(rows, 2), to_u32(N_THETA_H)]
+}
+
+fn groups(count: usize, size: usize) -> u32 {
+    to_u32(count.div_ceil(size))
 }

@@ -22,7 +22,8 @@ const FINISH_WGSL: &str = include_str!("../../shaders/bake/finish.wgsl");
 /// Bakes models on a device. Compiles its shaders once; keep it.
 ///
 /// - A lattice model is contracted along `theta_h` and `phi_d`, then evaluated along `theta_d` from cubics
-///   ([`gpbrdf_core::SeparableForm`]): every kernel, in single precision, and sigma with the mean.
+///   ([`gpbrdf_core::SeparableForm`]): every kernel, in single precision, and sigma with the mean. Inducing lattices are
+///   three of them, mixed into colours.
 /// - A dense model is a sum of kernel values over all samples, in f64 where the device computes in it. In single precision
 ///   the sum cancels; models that would lose more than four digits are refused ([`Error::NoShader`]), as is the Matern
 ///   kernel of general order, a Bessel function. Sigma is left at 0.
@@ -42,16 +43,32 @@ pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 /// A model on its way to a texture: one target a distinct cell.
 struct Targets {
     geometry: TableGeometry,
-    /// `[i_theta_h][row][i_theta_d]`: target without its prior mean, and sigma.
+    /// As `geometry.distinct()`, but the least of all components of the process: each has a space of its own, and a cell at
+    /// the horizon may round to either side of it.
+    distinct: Vec<usize>,
+    /// `[i_theta_h][row][i_theta_d]`: target without its prior mean, and sigma. Of inducing lattices as many again hold the
+    /// variances of the channels.
     buffer: wgpu::Buffer,
 }
 
 impl Targets {
-    fn new(context: &Context, space: InputSpace) -> Result<Self> {
+    fn new(context: &Context, model: &Model) -> Result<Self> {
+        let (space, others, copies) = match &model.process {
+            Process::Inducing(gp) => {
+                let spaces: Vec<InputSpace> = gp.components.iter().map(|c| c.lattice().space).collect();
+                (spaces.first().copied().unwrap_or(model.space), spaces, 2)
+            }
+            _ => (model.space, Vec::new(), 1),
+        };
         let geometry = TableGeometry::new(space);
-        let cells = N_THETA_H * geometry.third().len() * N_THETA_D;
+        let mut distinct = geometry.distinct().to_vec();
+        for other in others {
+            let found = TableGeometry::new(other);
+            distinct.iter_mut().zip(found.distinct()).for_each(|(least, &n)| *least = n.min(*least));
+        }
+        let cells = copies * N_THETA_H * geometry.third().len() * N_THETA_D;
         let buffer = context.empty_buffer("targets", 16 * cells as u64, wgpu::BufferUsages::STORAGE)?;
-        Ok(Self { geometry, buffer })
+        Ok(Self { geometry, distinct, buffer })
     }
 }
 
@@ -72,7 +89,7 @@ impl Baker {
         })
     }
 
-    /// Bakes the predictive mean, and sigma of a lattice model, into a new texture.
+    /// Bakes the predictive mean, and sigma of lattices, into a new texture.
     ///
     /// # Errors
     /// [`Error::NoShader`] for a model the device cannot bake, [`Error::Cancelled`], and those of [`Context::guard`].
@@ -92,7 +109,11 @@ impl Baker {
     /// # Errors
     /// Those of [`Baker::bake`].
     pub fn bake_into(&self, model: &Model, texture: &BrdfTexture, progress: &mut Progress<'_>) -> Result<()> {
-        let targets = Targets::new(&self.context, model.space)?;
+        // Its layers stay black there, with no error.
+        if self.context.info().backend == wgpu::Backend::Gl {
+            return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
+        }
+        let targets = Targets::new(&self.context, model)?;
         let mut first_channel = 0;
         match &model.process {
             Process::Lattice(groups) => {
@@ -108,6 +129,12 @@ impl Baker {
                     let mut within = |done: f64| progress(share(done));
                     self.add_dense(gp, &targets, first_channel, &mut within)?;
                     first_channel += gp.channels();
+                }
+            }
+            Process::Inducing(gp) => {
+                for k in 0..gp.components.len() {
+                    ask(progress, k as f64 / gp.components.len() as f64)?;
+                    self.lattice.add_component(&self.context, gp, k, &targets)?;
                 }
             }
             _ => return Err(Error::NoShader { what: "this kind of process".to_owned() }),
@@ -133,7 +160,7 @@ impl Baker {
             rows: to_u32(targets.geometry.third().len()),
             largest: if texture.precision() == Precision::Half { 65_504.0 } else { f32::MAX },
         };
-        let distinct: Vec<u32> = targets.geometry.distinct().iter().map(|&n| to_u32(n)).collect();
+        let distinct: Vec<u32> = targets.distinct.iter().map(|&n| to_u32(n)).collect();
         let context = &self.context;
         let uniform = context.uniform(&uniform)?;
         let distinct = context.buffer_of(

@@ -1,8 +1,8 @@
 //! The device against the f64 tables of the core.
 
 use gpbrdf_core::{
-    FitOptions, LatticeLayout, Layout, MeanFunction, Provenance, SampleSet, Shape, Solver, Source, Symmetry,
-    bake_mean, bake_sigma, fit,
+    FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Provenance, SampleSet, Shape, Solver,
+    Source, Symmetry, TableFitOptions, bake_mean, bake_sigma, fit, fit_table,
 };
 
 use super::*;
@@ -55,6 +55,7 @@ fn lattice_bakes_are_the_core_s_for_every_kernel() {
         let options = FitOptions { kernel: vec![shape], ..FitOptions::default() };
         let model = lattice_model("cherry-235", [16, 9, 6], symmetry, &options);
         let (mean, sigma) = errors(context, &model, Precision::Single);
+        eprintln!("{shape:?} {symmetry:?}: mean {mean:e}, sigma {sigma:e}");
         assert!(mean < 1e-4 && sigma < 2e-3, "{shape:?} {symmetry:?}: mean {mean:e}, sigma {sigma:e}");
     }
 }
@@ -82,6 +83,28 @@ fn sums_separate_channels_and_transforms_bake_too() {
     let model = lattice_model("red-plastic", [10, 8, 6], Symmetry::Reciprocal, &options);
     let (mean, sigma) = errors(context, &model, Precision::Single);
     assert!(mean < 1e-4 && sigma < 1e-3, "mean {mean:e}, sigma {sigma:e}");
+}
+
+#[test]
+fn inducing_lattices_bake_in_both_precisions() {
+    let Some(context) = test_context() else { return };
+    let table = Source::built_in("red-plastic").unwrap().table().unwrap().into_owned();
+    let cases = [
+        (Symmetry::Bilateral, Shape::Matern52, InducingSize::Floats(675)),
+        (Symmetry::Reciprocal, Shape::Matern32, InducingSize::Shape([7, 4, 3])),
+    ];
+    for (symmetry, kernel, size) in cases {
+        let options = TableFitOptions { size, symmetry, kernel, ..TableFitOptions::default() };
+        let model = fit_table(&table, &options, Provenance::default()).unwrap().0;
+        for (precision, limit) in [(Precision::Single, 1e-4), (Precision::Half, 1e-3)] {
+            let (mean, sigma) = errors(context, &model, precision);
+            eprintln!("inducing {symmetry:?} {precision:?}: mean {mean:e}, sigma {sigma:e}");
+            assert!(
+                mean < limit && sigma < 2e-3,
+                "{symmetry:?} {precision:?}: mean {mean:e}, sigma {sigma:e}"
+            );
+        }
+    }
 }
 
 fn dense_model(n: usize, symmetry: Symmetry, options: FitOptions) -> Model {

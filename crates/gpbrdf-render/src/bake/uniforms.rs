@@ -15,6 +15,7 @@ pub(crate) struct Lattice {
     pub(crate) second_prior: f32,
     pub(crate) limit: f32,
     pub(crate) padding: [f32; 3],
+    pub(crate) share: [f32; 4],
 }
 
 /// `Finish` of `finish.wgsl`.
@@ -55,7 +56,7 @@ mod tests {
             LATTICE_WGSL,
             "Lattice",
             Lattice,
-            [shape, first, third, second, pieces, signal_variance, second_prior, limit]
+            [shape, first, third, second, pieces, signal_variance, second_prior, limit, share]
         );
         for precision in [Precision::Half, Precision::Single] {
             assert_layout!(
