@@ -255,7 +255,7 @@ fn dropped_files_are_opened_once_and_stay_among_the_recent_ones() {
     let path = folder.path().join("dropped.safetensors");
     let table = gpbrdf_core::Source::built_in("red-plastic").unwrap().table().unwrap().into_owned();
     let options = gpbrdf_core::TableFitOptions {
-        size: gpbrdf_core::InducingSize::Floats(150),
+        size: gpbrdf_core::InducingSize::Shape([6, 5, 4]),
         ..gpbrdf_core::TableFitOptions::default()
     };
     let provenance = gpbrdf_core::Provenance { material: "squeezed".into(), ..Default::default() };

@@ -9,7 +9,7 @@ use super::scene::{LIMIT, Orbit, Shape};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::spheres::SphereLight;
-use super::widgets::{Number, reset, segments_ui, short};
+use super::widgets::{Number, narrow, reset, segments_ui, short};
 
 /// What the views are called, with what the mouse does in them.
 const SPHERE_HELP: &str = "Sphere view: drag turns the light";
@@ -55,13 +55,12 @@ impl Viewer {
             Rect::from_center_size(square.center(), square.size() * zoom)
         };
         let mut disc = zoomed(picture);
-        let rim = ui.visuals().extreme_bg_color;
         match (mode, &shown.truth) {
             (SphereShown::Swipe, Some(truth)) => {
                 let line = egui::lerp(disc.left()..=disc.right(), self.settings.swipe);
                 part(ui, truth, disc, [disc.left(), line], picture);
                 part(ui, &shown.mean, disc, [line, disc.right()], picture);
-                rim_ui(ui, disc, picture, rim);
+                rim_ui(ui, disc, picture, truth.size()[0]);
                 let stroke = egui::Stroke::new(1.5, text.gamma_multiply(0.8));
                 let (upper, lower) = (disc.top().max(picture.top()), disc.bottom().min(picture.bottom()));
                 if picture.x_range().contains(line) {
@@ -149,7 +148,7 @@ impl Viewer {
         let mut row = |label: &str, range, default: f32, help: &str, value: &mut f32| {
             let mut shown = f64::from(*value);
             if Number::new(label, range, f64::from(default), help).row_ui(ui, &mut shown) {
-                *value = super::widgets::narrow(shown);
+                *value = narrow(shown);
             }
         };
         row(
@@ -259,7 +258,7 @@ impl Viewer {
         let mut swipe = f64::from(self.settings.swipe);
         let number = Number::new("Swipe", 0.0..=1.0, 0.5, "Where truth ends and prediction begins");
         if number.row_ui(ui, &mut swipe) {
-            self.settings.swipe = super::widgets::narrow(swipe);
+            self.settings.swipe = narrow(swipe);
         }
         let degrees = |ui: &mut Ui, label: &str, help: &str, value: &mut f64| {
             let mut shown = value.to_degrees();
@@ -334,14 +333,15 @@ fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, [left, right]: [f32; 2], c
 /// A whole picture of a sphere, within `clip`.
 fn whole(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
     part(ui, texture, rect, [rect.left(), rect.right()], clip);
-    rim_ui(ui, rect, clip, ui.visuals().extreme_bg_color);
+    rim_ui(ui, rect, clip, texture.size()[0]);
 }
 
-/// Hides the steps of a sphere's last pixels under a smooth ring of the background.
-fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, background: Color32) {
+/// Hides the steps of a sphere's last one and a half pixels, of `pixels` across, under a smooth ring of the background.
+fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, pixels: usize) {
     let radius = 0.5 * disc.width();
-    let stroke = egui::Stroke::new(0.03 * radius, background);
-    ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), 1.003 * radius, stroke);
+    let stroke =
+        egui::Stroke::new(6.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
+    ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), radius, stroke);
 }
 
 fn footer_ui(ui: &mut Ui, area: Rect, shown: &ShownSpheres, mode: SphereShown) {
