@@ -156,6 +156,7 @@ impl Viewer {
                     .formatter(move |mark, _| {
                         format!("{}°", short(if square { unwarped(mark.value) } else { mark.value }))
                     })
+                    .label_spacing(egui::Rangef::new(22.0, 30.0))
                     .label("θh"),
             ])
             .custom_y_axes(vec![
