@@ -236,10 +236,168 @@ fn keys_hide_panels_and_show_help() {
     }
 }
 
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|e| e.to_string())
+    }
+}
+
+#[test]
+fn dropped_files_are_opened_once_and_stay_among_the_recent_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dropped.safetensors");
+    let table = gpbrdf_core::Source::built_in("red-plastic").unwrap().table().unwrap().into_owned();
+    let options = gpbrdf_core::TableFitOptions {
+        size: gpbrdf_core::InducingSize::Shape([6, 5, 4]),
+        ..gpbrdf_core::TableFitOptions::default()
+    };
+    let provenance = gpbrdf_core::Provenance { material: "squeezed".into(), ..Default::default() };
+    let (model, _) = gpbrdf_core::fit_table(&table, &options, provenance).unwrap();
+    std::fs::write(&path, model.to_bytes().unwrap()).unwrap();
+
+    let mut driver = Driver::new(&[PathBuf::from("lambert")]);
+    driver.fitted();
+    driver.harness.input_mut().dropped_files.push(std::sync::Arc::new(Dropped(path.clone())));
+    driver.wait("the dropped file", |d| d.harness.query_by_label("Show squeezed").is_some());
+    driver.fitted();
+    assert!(driver.shows("A fitted model from a file.") && driver.shows("Compressed, on inducing lattices"));
+    assert!(driver.harness.query_by_label("Prediction slice").is_some());
+    assert!(driver.harness.query_by_label("Truth slice").is_none());
+    driver.wait("sigma", |d| d.harness.query_by_label("Sigma slice").is_some());
+    driver.click("File");
+    driver.harness.get_by_label_contains("Recent").hover();
+    driver.harness.run_steps(3);
+    driver.harness.get_by_label_contains("Recent").click();
+    driver.harness.run_steps(3);
+    assert!(driver.shows(&path.display().to_string()));
+}
+
+#[test]
+fn kernels_are_chosen_per_axis_and_targets_change() {
+    let mut driver = Driver::new(&[]);
+    driver.slide("Samples", 1500.0);
+    driver.fitted();
+    let choose = |driver: &mut Driver, what: &str, option: &str| {
+        driver.harness.get_by_role_and_label(Role::ComboBox, what).click();
+        driver.harness.run_steps(3);
+        driver.harness.get_by_label(option).click();
+        driver.harness.run_steps(3);
+        driver.fitted();
+        driver.likelihood()
+    };
+    let before = driver.likelihood();
+    let rough = choose(&mut driver, "Kernel θd", "Matérn 1/2");
+    assert!(rough < before, "{rough} {before}");
+    choose(&mut driver, "Kernel φd", "Rational quadratic");
+    assert!(driver.shows("Mixture α φd"));
+    let linear = choose(&mut driver, "Target", "f");
+    assert!(linear < rough, "{linear} {rough}");
+    choose(&mut driver, "Prior mean", "Zero");
+    assert!(driver.shows("Optimised"));
+}
+
+#[test]
+fn a_long_fit_is_cancelled_and_the_last_result_stays() {
+    let mut driver = Driver::new(&[]);
+    driver.slide("Samples", 1500.0);
+    driver.fitted();
+    driver.harness.get_by_role_and_label(Role::ComboBox, "Layout").click();
+    driver.harness.run_steps(3);
+    driver.harness.get_by_label("Random directions").click();
+    driver.harness.run_steps(3);
+    driver.slide("Samples", 3000.0);
+    driver.wait("a search", |d| d.shows("Fitting"));
+    let start = Instant::now();
+    driver.harness.key_press(Key::Escape);
+    driver.wait("the end", |d| d.shows("Cancelled"));
+    assert!(start.elapsed() < Duration::from_secs(5));
+    assert!(driver.harness.query_by_label("Prediction slice").is_some());
+    // The thread is free for what comes next.
+    driver.slide("Samples", 60.0);
+    driver.fitted();
+    assert!(driver.shows("60 samples"));
+}
+
+#[test]
+fn a_number_goes_back_to_its_default() {
+    let mut driver = Driver::new(&[]);
+    driver.slide("φd", 30.0);
+    let value = |d: &Driver| {
+        let slider = d.harness.get_by_role_and_label(Role::Slider, "φd");
+        slider.accesskit_node().numeric_value().unwrap()
+    };
+    assert!((value(&driver) - 30.0).abs() < 1e-9);
+    driver.harness.get_by_role_and_label(Role::Slider, "φd").click_modifiers(Modifiers::COMMAND);
+    driver.harness.run_steps(3);
+    assert!((value(&driver) - 90.0).abs() < 1e-9, "{}", value(&driver));
+}
+
+#[test]
+fn every_control_has_a_name() {
+    let mut driver = Driver::new(&[PathBuf::from("ward"), PathBuf::from("lambert")]);
+    driver.fitted();
+    for key in [Key::Num1, Key::Num2, Key::Num3, Key::Num4] {
+        driver.harness.key_press(key);
+        driver.harness.run_steps(3);
+        for node in driver.harness.root().children_recursive() {
+            let node = node.accesskit_node();
+            if egui::accessibility::is_input(node.role()) {
+                let named = node.label().is_some_and(|l| !l.trim().is_empty());
+                assert!(named, "{:?} with value {:?}", node.role(), node.value());
+            }
+        }
+    }
+}
+
+#[test]
+fn large_text_and_small_windows_show_every_view() {
+    for size in [[1280.0, 800.0], [800.0, 500.0], [500.0, 300.0]] {
+        let mut driver = Driver::sized(&[PathBuf::from("lambert")], size);
+        driver.fitted();
+        for (key, view) in
+            [(Key::Num1, "Lobe plot"), (Key::Num2, "Prediction slice"), (Key::Num3, "Lobe plot")]
+        {
+            driver.harness.key_press(key);
+            driver.harness.run_steps(3);
+            let rect = driver.harness.get_by_label(view).rect();
+            assert!(rect.width() > 60.0 && rect.height() > 60.0, "{view} {rect} in {size:?}");
+        }
+    }
+}
+
+#[test]
+fn the_sphere_is_written_and_curves_of_all_kinds_are_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::new(&[PathBuf::from("lambert")]);
+    driver.slide("Samples", 1500.0);
+    driver.wait("the sphere", |d| d.viewer().is_settled());
+    driver.click("File");
+    driver.click("Export sphere…");
+    let path = folder.path().join("ball.png");
+    driver.enter("Path", &path.display().to_string());
+    driver.click("Write");
+    driver.wait("pictures", |_| exists(&path));
+    for name in ["ball-truth.exr", "ball-prediction.exr"] {
+        assert!(exists(&folder.path().join(name)), "{name}");
+    }
+    for name in ["Over θh", "Over θd", "Over φd", "Albedo"] {
+        driver.harness.get_by_label(name).click();
+        driver.harness.run_steps(4);
+        assert!(driver.harness.query_by_label(&format!("{name} plot")).is_some(), "{name}");
+    }
+}
+
 /// Renew with `UPDATE_SNAPSHOTS=1`; made with lavapipe.
 #[test]
 fn pictures_are_as_they_were() {
-    let mut driver = Driver::sized(&[], [500.0, 380.0]);
+    let mut driver = Driver::sized(&[], [930.0, 660.0]);
     let options = SnapshotOptions::new().output_path("../../tests/golden").max_failed_pixels(40);
     driver.harness.key_press(Key::F1);
     driver.wait("everything", |d| d.viewer().is_settled());

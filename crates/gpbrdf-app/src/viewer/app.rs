@@ -88,6 +88,8 @@ pub struct Viewer {
     pub(crate) plots: PlotCache,
     pub(crate) environment: (u64, String, Arc<Environment>),
     pub(crate) reset_views: bool,
+    /// What a session says about the scale, until it is taken over.
+    new_zoom: Option<f32>,
     pub(crate) solo: Option<DocumentId>,
     next_id: u64,
     applied_theme: Option<Option<bool>>,
@@ -140,6 +142,7 @@ impl Viewer {
             plots: PlotCache::default(),
             environment: (0, "Studio (built in)".to_owned(), Arc::new(Environment::studio())),
             reset_views: false,
+            new_zoom: None,
             solo: None,
             next_id: 0,
             applied_theme: None,
@@ -226,7 +229,10 @@ impl Viewer {
                 self.open_built_in(material.name, None);
             } else if Session::is_named(path) {
                 match Session::read(path) {
-                    Ok(session) => self.restore(session),
+                    Ok(session) => {
+                        self.restore(session);
+                        self.settings.remember(path);
+                    }
                     Err(error) => self.messages.error(format!("{error:#}")),
                 }
             } else {
@@ -281,6 +287,7 @@ impl Viewer {
         }
         let recent = std::mem::take(&mut self.settings.recent);
         self.settings = Settings { recent, ..session.settings };
+        self.new_zoom = Some(self.settings.zoom);
         for saved in session.documents {
             match (&saved.path, &saved.built_in) {
                 (Some(path), _) => {
@@ -329,6 +336,12 @@ impl Viewer {
                 Event::Slices(images) => self.take_slices(ctx, *images),
                 Event::Spheres(images) => self.take_spheres(ctx, images),
                 Event::Scene(image) => self.scene = Some(image),
+                Event::SceneFailed(message) => {
+                    // The processor's sphere is always there; choosing an object again opens the device anew.
+                    self.settings.shape = Shape::Sphere;
+                    (self.scene, self.staged) = (None, None);
+                    self.messages.error(message);
+                }
                 Event::Albedo(albedos) => self.albedos = albedos,
                 other => self.take_stage(other),
             }
@@ -621,15 +634,21 @@ impl Viewer {
         let ctx = ui.ctx().clone();
         self.apply_theme(&ctx);
         self.receive(&ctx);
-        let dropped = ctx.input(|i| super::dropped_paths(&i.raw));
-        self.open_paths(&dropped);
+        // A frame may be laid out twice; files are dropped once.
+        if ctx.current_pass_index() == 0 {
+            let dropped = ctx.input(|i| super::dropped_paths(&i.raw));
+            self.open_paths(&dropped);
+        }
         for action in shortcuts::pressed(&ctx) {
             self.act(&ctx, action);
         }
         self.window_ui(ui);
         self.request();
         self.reset_views = false;
-        self.settings.zoom = ctx.zoom_factor();
+        match self.new_zoom.take() {
+            Some(zoom) => ctx.set_zoom_factor(zoom.clamp(0.5, 3.0)),
+            None => self.settings.zoom = ctx.zoom_factor(),
+        }
         if self.documents.iter().any(Document::is_busy) {
             // The seconds count on.
             ctx.request_repaint_after(Duration::from_millis(100));

@@ -46,6 +46,8 @@ pub(crate) enum Event {
     Spheres(Box<super::spheres::SphereImages>),
     /// An object on the device.
     Scene(super::scene::SceneImage),
+    /// An object cannot be shown: its file is broken or the device is gone.
+    SceneFailed(String),
     /// Metrics of pictures of a result.
     Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
     /// An environment has been read, or not.

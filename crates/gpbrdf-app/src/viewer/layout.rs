@@ -9,7 +9,6 @@ use super::app::Viewer;
 use super::dialogs::Purpose;
 use super::settings::Arrangement;
 use super::shortcuts::{self, Action, MOUSE, SHORTCUTS};
-use super::widgets::segments_ui;
 
 impl Viewer {
     /// The whole window.
@@ -43,13 +42,38 @@ impl Viewer {
             });
             return;
         }
+        // Small windows and large text: views keep a size at which they can be read, and are scrolled to.
+        let least = match self.settings.arrangement {
+            Arrangement::All => egui::vec2(900.0, 620.0),
+            Arrangement::Slices => egui::vec2(860.0, 380.0),
+            Arrangement::Plots => egui::vec2(560.0, 300.0),
+            Arrangement::Sphere => egui::vec2(480.0, 280.0),
+        };
+        let there = ui.available_size();
+        if there.x >= least.x && there.y >= least.y {
+            self.arranged_ui(ui);
+            return;
+        }
+        // The wheel zooms what is under it.
+        let area = egui::ScrollArea::both().scroll_source(egui::scroll_area::ScrollSource::SCROLL_BAR);
+        area.auto_shrink(false).show(ui, |ui| {
+            let (rect, _) =
+                ui.allocate_exact_size(there.max(least) - egui::Vec2::splat(12.0), egui::Sense::hover());
+            ui.scope_builder(egui::UiBuilder::new().max_rect(rect), |ui| self.arranged_ui(ui));
+        });
+    }
+
+    fn arranged_ui(&mut self, ui: &mut Ui) {
         match self.settings.arrangement {
             Arrangement::Slices => self.slices_ui(ui),
             Arrangement::Plots => self.plots_ui(ui),
             Arrangement::Sphere => self.sphere_ui(ui),
             Arrangement::All => {
                 let area = ui.available_rect_before_wrap();
-                let (gap, split) = (14.0, (area.height() * 0.54).round());
+                // Four slices in a row take what their width allows; the rest is the sphere's and the plots'.
+                let gap = 14.0;
+                let slices = (0.25 * area.width() + 36.0).min(area.height() * 0.46);
+                let split = (area.height() - slices - gap).round();
                 let sphere_width = (split * 0.92).min(area.width() * 0.42).round();
                 let top = egui::Rect::from_min_size(area.min, egui::vec2(sphere_width, split));
                 let right = egui::Rect::from_min_max(
@@ -150,7 +174,14 @@ impl Viewer {
                 }
             });
             ui.add_space(12.0);
-            segments_ui(ui, &mut self.settings.arrangement, &Arrangement::ALL, Arrangement::name);
+            let actions = [Action::Overview, Action::Slices, Action::Plots, Action::Sphere];
+            for (view, action) in Arrangement::ALL.into_iter().zip(actions) {
+                let shown = self.settings.arrangement == view;
+                let help = format!("Show it ({})", shortcuts::text(&ctx, action));
+                if ui.selectable_label(shown, view.name()).on_hover_text(help).clicked() {
+                    self.settings.arrangement = view;
+                }
+            }
         });
     }
 

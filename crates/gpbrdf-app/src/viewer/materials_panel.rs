@@ -4,7 +4,7 @@ use eframe::egui::{self, Color32, RichText, Ui};
 
 use super::app::Viewer;
 use super::document::{Document, DocumentId, Work};
-use super::shortcuts::Action;
+use super::shortcuts::{self, Action};
 use super::widgets::section_ui;
 
 /// What the list asks for.
@@ -20,7 +20,12 @@ impl Viewer {
         ui.horizontal(|ui| {
             section_ui(ui, "Materials");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.button("Open…").clicked() {
+                let keys = shortcuts::text(ui.ctx(), Action::Open);
+                if ui
+                    .button("Open…")
+                    .on_hover_text(format!("Files and built-in materials ({keys})"))
+                    .clicked()
+                {
                     let ctx = ui.ctx().clone();
                     self.act(&ctx, Action::Open);
                 }
@@ -42,7 +47,7 @@ impl Viewer {
         }
         if let Some(document) = self.document() {
             ui.add_space(2.0);
-            ui.label(RichText::new(&document.source.description).weak().small());
+            ui.label(RichText::new(&document.source.description).small());
         }
     }
 }
@@ -73,7 +78,8 @@ fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<Doc
                 }
             }
             let alone = solo == Some(document.id);
-            if ui.selectable_label(alone, "Solo").on_hover_text("Draw this one alone").clicked() {
+            let solo = ui.selectable_label(alone, "Solo").accessible_name(format!("Solo {name}"));
+            if solo.on_hover_text("Draw this one alone in the plots").clicked() {
                 wish = Some(Wish::Solo(document.id));
             }
             let remove = ui.button("×").accessible_name(format!("Remove {name}"));

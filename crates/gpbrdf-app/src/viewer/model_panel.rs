@@ -1,7 +1,7 @@
 //! The model of the selected material: what to sample, what to fit, hyper-parameters by hand.
 
 use eframe::egui::{self, RichText, Ui};
-use gpbrdf_core::{Hyper, LatticeLayout, MeanFunction, Symmetry};
+use gpbrdf_core::{Hyper, LatticeLayout, MeanFunction, Process, Symmetry};
 
 use super::app::Viewer;
 use super::document::{Document, Work};
@@ -9,7 +9,7 @@ use super::shortcuts::{self, Action};
 use super::spec::{
     KernelKind, LayoutKind, ModelSpec, SymmetryKind, TransformKind, hyper_parameters, set_hyper_parameter,
 };
-use super::widgets::{Number, choice_ui, row_ui, section_ui, short};
+use super::widgets::{Number, choice_ui, reset, row_ui, section_ui, short};
 
 /// The most samples of a lattice and off it.
 const MAX_LATTICE: f64 = 200_000.0;
@@ -23,6 +23,15 @@ impl Viewer {
         section_ui(ui, "Measurements");
         if document.is_model() {
             ui.label("A fitted model from a file.");
+            if let Some(fitted) = &document.fitted {
+                let kind = match fitted.model.process {
+                    Process::Lattice(_) => "Exact, on a lattice",
+                    Process::Dense(_) => "Exact, dense",
+                    Process::Inducing(_) => "Compressed, on inducing lattices",
+                    _ => "Of another kind",
+                };
+                ui.label(format!("{kind}: {} numbers.", fitted.model.floats()));
+            }
         } else if document.is_scattered() {
             ui.label("Scattered measurements: all are used, solved densely.");
         } else {
@@ -66,9 +75,15 @@ fn layout_ui(ui: &mut Ui, spec: &mut ModelSpec) {
             spec.shape = lattice.shape;
         }
         row_ui(ui, "Lattice", |ui| {
-            for (side, name) in spec.shape.iter_mut().zip(["θh", "θd", "φd"]) {
+            let defaults = LatticeLayout::default().shape;
+            for ((side, default), name) in spec.shape.iter_mut().zip(defaults).zip(["θh", "θd", "φd"]) {
                 let value = egui::DragValue::new(side).range(2..=160).speed(0.1);
-                ui.add(value).accessible_name(format!("Nodes along {name}")).on_hover_text(name);
+                let help = format!("Nodes along {name}\nCtrl+click: back to {default}");
+                let response =
+                    ui.add(value).accessible_name(format!("Nodes along {name}")).on_hover_text(help);
+                if reset(ui, &response) {
+                    *side = default;
+                }
             }
         });
         choice_ui(ui, "Symmetry", &mut spec.symmetry, &SymmetryKind::ALL, SymmetryKind::name);
@@ -79,7 +94,10 @@ fn layout_ui(ui: &mut Ui, spec: &mut ModelSpec) {
         if number.row_ui(ui, &mut count) {
             spec.count = whole(count);
         }
-        row_ui(ui, "Seed", |ui| ui.add(egui::DragValue::new(&mut spec.seed)));
+        let seed = row_ui(ui, "Seed", |ui| ui.add(egui::DragValue::new(&mut spec.seed)));
+        if reset(ui, &seed.on_hover_text("Of the random directions\nCtrl+click: back to 0")) {
+            spec.seed = 0;
+        }
     }
 }
 

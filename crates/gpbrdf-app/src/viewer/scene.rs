@@ -122,14 +122,11 @@ pub(crate) const LIMIT: f32 = 0.1;
 
 /// Starts the thread that renders.
 pub(crate) fn spawn(outbox: Outbox, state: RenderState) -> std::io::Result<Sender<SceneRequest>> {
-    let mut scene = Scene { state, renderer: None, texture: None, materials: None, last: None, broken: None };
+    let mut scene = Scene { state, renderer: None, texture: None, materials: None, last: None };
     Mailbox::spawn("scene", move |request: SceneRequest, stale| {
         if let Err(message) = scene.render(&request, &outbox, stale) {
-            // The same trouble again would say nothing new.
-            if scene.broken.as_ref() != Some(&message) {
-                outbox.send(Event::Environment { result: Err(message.clone()) });
-            }
-            scene.broken = Some(message);
+            (scene.renderer, scene.materials, scene.last) = (None, None, None);
+            outbox.send(Event::SceneFailed(message));
         }
     })
 }
@@ -140,7 +137,6 @@ struct Scene {
     texture: Option<(TextureId, [u32; 2])>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
-    broken: Option<String>,
 }
 
 /// Textures, with what they were made from.

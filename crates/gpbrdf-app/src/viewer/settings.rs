@@ -110,3 +110,31 @@ impl Settings {
         self.recent.truncate(MAX_RECENT);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_come_back_and_what_is_missing_is_as_at_first() {
+        let mut settings = Settings { zoom: 1.25, dark: Some(false), ..Settings::default() };
+        settings.slices.square_theta_h = true;
+        settings.remember(Path::new("a.binary"));
+        let text = serde_json::to_string(&settings).unwrap();
+        assert_eq!(serde_json::from_str::<Settings>(&text).unwrap(), settings);
+        let partial: Settings = serde_json::from_str("{\"zoom\": 2.0}").unwrap();
+        assert_eq!(partial, Settings { zoom: 2.0, ..Settings::default() });
+    }
+
+    #[test]
+    fn recent_files_are_few_and_the_newest_is_first() {
+        let mut settings = Settings::default();
+        for i in 0..20 {
+            settings.remember(&PathBuf::from(format!("{i}.csv")));
+        }
+        settings.remember(Path::new("15.csv"));
+        assert_eq!(settings.recent.len(), MAX_RECENT);
+        assert_eq!(settings.recent[0], Path::new("15.csv"));
+        assert_eq!(settings.recent.iter().filter(|p| *p == Path::new("15.csv")).count(), 1);
+    }
+}

@@ -160,10 +160,11 @@ pub(crate) struct SliceImages {
     pub(crate) panels: [Option<SlicePanel>; 4],
 }
 
-/// Starts the thread that makes slices.
+/// Starts the thread that makes slices, with workers of its own: those of the fitter may be busy for seconds.
 pub(crate) fn spawn(outbox: Outbox) -> std::io::Result<Sender<SliceRequest>> {
+    let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
     Mailbox::spawn("slices", move |request: SliceRequest, stale| {
-        let images = make(&request);
+        let images = pool.install(|| make(&request));
         if !stale() {
             outbox.send(Event::Slices(Box::new(images)));
         }

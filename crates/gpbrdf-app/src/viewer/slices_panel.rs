@@ -20,14 +20,17 @@ const MEANINGS: [&str; 4] =
     ["f, 1/sr", "f, 1/sr", "ln(prediction + 0.001) - ln(truth + 0.001)", "standard deviation of the target"];
 
 /// What the axes take of a view.
-const AXES: egui::Vec2 = egui::vec2(58.0, 40.0);
+const AXES: egui::Vec2 = egui::vec2(72.0, 40.0);
+
+/// Height of a view's title and the gap below it.
+const TITLE: f32 = 28.0;
 
 /// In how many columns views are largest.
 fn columns(views: usize, area: egui::Vec2) -> usize {
     let side = |columns: usize| {
         let rows = views.div_ceil(columns);
         let (columns, rows) = (narrow(columns as f64), narrow(rows as f64));
-        (area.x / columns - AXES.x).min(area.y / rows - AXES.y - 24.0)
+        (area.x / columns - AXES.x).min(area.y / rows - AXES.y - TITLE)
     };
     (1..=views.max(1)).max_by(|a, b| side(*a).total_cmp(&side(*b))).unwrap_or(1)
 }
@@ -106,8 +109,13 @@ impl Viewer {
                         ui.set_min_size(size);
                         ui.set_max_size(size);
                         ui.vertical(|ui| {
-                            ui.spacing_mut().item_spacing.y = 2.0;
-                            title_ui(ui, i, shown.limits[i]);
+                            // The topmost mark of an axis stands half a line above it.
+                            ui.spacing_mut().item_spacing.y = 8.0;
+                            let side = (size.x - AXES.x).min(size.y - AXES.y - TITLE).max(40.0);
+                            ui.scope(|ui| {
+                                ui.set_max_width(side + AXES.x - 14.0);
+                                title_ui(ui, i, shown.limits[i]);
+                            });
                             let point = self.slice_ui(ui, document, i, texture.id());
                             hovered = hovered.or(point);
                         });
@@ -130,7 +138,7 @@ impl Viewer {
             .link_axis(egui::Id::unique("slices"), true)
             .link_cursor(egui::Id::unique("slices"), true)
             .data_aspect(1.0)
-            .width(side + AXES.x)
+            .width(side + AXES.x - 14.0)
             .height(side + AXES.y)
             .set_margin_fraction(egui::vec2(0.0, 0.0))
             .allow_scroll(false)
@@ -140,38 +148,37 @@ impl Viewer {
             .show_y(false)
             .show_grid(false)
             .clamp_grid(true)
-            .x_grid_spacer(|input| degrees_marks(&input))
-            .y_grid_spacer(|input| degrees_marks(&input))
+            .x_grid_spacer(move |input| degrees_marks(&input, square))
+            .y_grid_spacer(|input| degrees_marks(&input, false))
             .label_formatter(|_| None)
             .custom_x_axes(vec![
                 AxisHints::new_x()
                     .formatter(move |mark, _| {
-                        let x = mark.value / 90.0;
-                        format!("{}°", short(if square { 90.0 * x * x } else { mark.value }))
+                        format!("{}°", short(if square { unwarped(mark.value) } else { mark.value }))
                     })
+                    .label_spacing(egui::Rangef::new(22.0, 30.0))
                     .label("θh"),
             ])
             .custom_y_axes(vec![
                 AxisHints::new_y()
                     .formatter(|mark, _| format!("{}°", short(mark.value)))
                     .label("θd")
-                    .min_thickness(AXES.x - 22.0),
+                    .min_thickness(AXES.x - 36.0),
             ]);
         if self.reset_views {
             plot = plot.reset();
         }
         let show_samples = self.settings.show_samples;
         let regions = self.settings.show_regions;
-        let place =
-            move |theta_h: f64| if square { 90.0 * (theta_h / 90.0).max(0.0).sqrt() } else { theta_h };
+        let place = move |theta_h: f64| if square { warped(theta_h) } else { theta_h };
         let samples = if show_samples { sample_points(document, phi_d, place) } else { Vec::new() };
         let response = plot.show(ui, |plot| {
             let image = PlotImage::new(TITLES[i], texture, PlotPoint::new(45.0, 45.0), [90.0, 90.0]);
             plot.image(image.allow_hover(false));
             if !samples.is_empty() {
-                let white =
-                    Points::new("samples", samples).radius(1.6).color(Color32::WHITE).allow_hover(false);
-                plot.points(white);
+                let points =
+                    Points::new("samples", samples).radius(1.6).color(document.colour).allow_hover(false);
+                plot.points(points);
             }
             if regions {
                 for (name, theta_h, theta_d) in REGIONS {
@@ -215,15 +222,30 @@ pub(crate) fn zoom(plot: &mut PlotUi<'_>) {
     }
 }
 
-/// Marks every 15 or 30 degrees.
-fn degrees_marks(input: &GridInput) -> Vec<GridMark> {
+/// Where degrees of theta_h stand on an axis with the table's warp.
+fn warped(degrees: f64) -> f64 {
+    90.0 * (degrees / 90.0).max(0.0).sqrt()
+}
+
+/// Degrees of theta_h at a place of an axis with the table's warp.
+fn unwarped(place: f64) -> f64 {
+    place * place.abs() / 90.0
+}
+
+/// Marks at round degrees: every 5 or 30, of a warped axis denser where it is wider.
+fn degrees_marks(input: &GridInput, warp: bool) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let step = if high - low < 40.0 { 5.0 } else { 30.0 };
-    (0..=18)
-        .map(|i| f64::from(i) * step)
-        .filter(|x| *x <= 90.0 && *x >= low - step && *x <= high + step)
-        .map(|value| GridMark { value, step_size: step })
-        .collect()
+    let near = high - low < 40.0;
+    let step = if near { 5.0 } else { 30.0 };
+    let values: Vec<f64> = match (warp, near) {
+        (true, false) => [0.0, 5.0, 20.0, 45.0, 90.0].map(warped).to_vec(),
+        (true, true) => [0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0]
+            .map(warped)
+            .to_vec(),
+        (false, _) => (0..=18).map(|i| f64::from(i) * step).filter(|x| *x <= 90.0).collect(),
+    };
+    let inside = values.into_iter().filter(|x| *x >= low - step && *x <= high + step);
+    inside.map(|value| GridMark { value, step_size: step }).collect()
 }
 
 fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
@@ -323,4 +345,34 @@ fn hover_ui(ui: &Ui, document: &Document, angles: HalfDiff) {
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_a_warped_axis_stand_at_round_degrees() {
+        let input = GridInput { bounds: (0.0, 90.0), base_step_size: 1.0 };
+        let degrees = |warp: bool| -> Vec<f64> {
+            let marks = degrees_marks(&input, warp);
+            marks.iter().map(|m| if warp { unwarped(m.value) } else { m.value }).collect()
+        };
+        assert_eq!(degrees(false), [0.0, 30.0, 60.0, 90.0]);
+        for (found, expected) in std::iter::zip(degrees(true), [0.0, 5.0, 20.0, 45.0, 90.0]) {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+        assert!((warped(unwarped(30.0)) - 30.0).abs() < 1e-12 && warped(22.5) == 45.0);
+    }
+
+    #[test]
+    fn values_of_a_direction_are_read() {
+        let source = gpbrdf_core::Source::built_in("lambert").unwrap();
+        let document = Document::new(super::super::document::DocumentId(0), source);
+        let angles = |theta_h| HalfDiff { theta_h, theta_d: 0.3, phi_d: FRAC_PI_2 };
+        let lines = hover_lines(&document, angles(0.2));
+        assert!(lines.iter().any(|(name, _)| *name == "truth"), "{lines:?}");
+        let below = HalfDiff { theta_h: 1.5, theta_d: 1.5, phi_d: 0.0 };
+        assert!(hover_lines(&document, below).iter().any(|(_, value)| value == "below the horizon"));
+    }
 }

@@ -9,7 +9,11 @@ use super::scene::{LIMIT, Orbit, Shape};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::spheres::SphereLight;
-use super::widgets::{Number, reset, segments_ui, short};
+use super::widgets::{Number, narrow, reset, segments_ui, short};
+
+/// What the views are called, with what the mouse does in them.
+const SPHERE_HELP: &str = "Sphere view: drag turns the light";
+const OBJECT_HELP: &str = "Object view: drag orbits";
 
 impl Viewer {
     /// The sphere and its controls.
@@ -26,7 +30,7 @@ impl Viewer {
         let Some(id) = self.document().map(|d| d.id) else { return };
         let area = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(area, Sense::click_and_drag());
-        let name = "Sphere view: drag turns the light";
+        let name = if self.settings.shape == Shape::Sphere { SPHERE_HELP } else { OBJECT_HELP };
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, name));
         ui.painter().rect_filled(area, 6.0, ui.visuals().extreme_bg_color);
         if self.settings.shape != Shape::Sphere {
@@ -45,34 +49,43 @@ impl Viewer {
         let caption = |at: egui::Pos2, align: egui::Align2, words: &str| {
             ui.painter().text(at, align, words, font.clone(), text);
         };
-        let mut disc = square(picture);
+        let zoom = self.settings.orbit.zoom;
+        let zoomed = |area: Rect| {
+            let square = square(area);
+            Rect::from_center_size(square.center(), square.size() * zoom)
+        };
+        let mut disc = zoomed(picture);
         match (mode, &shown.truth) {
             (SphereShown::Swipe, Some(truth)) => {
                 let line = egui::lerp(disc.left()..=disc.right(), self.settings.swipe);
-                part(ui, truth, disc, disc.left(), line);
-                part(ui, &shown.mean, disc, line, disc.right());
+                part(ui, truth, disc, [disc.left(), line], picture);
+                part(ui, &shown.mean, disc, [line, disc.right()], picture);
+                rim_ui(ui, disc, picture, truth.size()[0]);
                 let stroke = egui::Stroke::new(1.5, text.gamma_multiply(0.8));
-                ui.painter().line_segment([pos2(line, disc.top()), pos2(line, disc.bottom())], stroke);
+                let (upper, lower) = (disc.top().max(picture.top()), disc.bottom().min(picture.bottom()));
+                if picture.x_range().contains(line) {
+                    ui.painter().line_segment([pos2(line, upper), pos2(line, lower)], stroke);
+                }
                 caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "Truth");
                 caption(pos2(area.right() - 12.0, top), egui::Align2::RIGHT_TOP, "Prediction");
             }
             (SphereShown::SideBySide, Some(truth)) => {
                 let (left, right) = picture.split_left_right_at_fraction(0.5);
-                disc = square(left.shrink(4.0));
-                let other = square(right.shrink(4.0));
-                part(ui, truth, disc, disc.left(), disc.right());
-                part(ui, &shown.mean, other, other.left(), other.right());
-                caption(pos2(disc.center().x, top), egui::Align2::CENTER_TOP, "Truth");
-                caption(pos2(other.center().x, top), egui::Align2::CENTER_TOP, "Prediction");
+                let (left, right) = (left.shrink(4.0), right.shrink(4.0));
+                disc = zoomed(left);
+                whole(ui, truth, disc, left);
+                whole(ui, &shown.mean, zoomed(right), right);
+                caption(pos2(left.center().x, top), egui::Align2::CENTER_TOP, "Truth");
+                caption(pos2(right.center().x, top), egui::Align2::CENTER_TOP, "Prediction");
             }
             (SphereShown::Difference, _) => {
                 let image = shown.difference.as_ref().unwrap_or(&shown.mean);
-                part(ui, image, disc, disc.left(), disc.right());
+                whole(ui, image, disc, picture);
                 caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "1 - prediction / truth");
             }
             (SphereShown::Sigma, _) if shown.sigma.is_some() => {
                 let image = shown.sigma.as_ref().unwrap_or(&shown.mean);
-                part(ui, image, disc, disc.left(), disc.right());
+                whole(ui, image, disc, picture);
                 caption(
                     pos2(area.left() + 12.0, top),
                     egui::Align2::LEFT_TOP,
@@ -80,19 +93,20 @@ impl Viewer {
                 );
             }
             _ => {
-                part(ui, &shown.mean, disc, disc.left(), disc.right());
+                whole(ui, &shown.mean, disc, picture);
                 caption(pos2(area.left() + 12.0, top), egui::Align2::LEFT_TOP, "Prediction");
             }
         }
         footer_ui(ui, area, shown, mode);
         self.sphere_drag(ui, &response, disc);
+        self.zoom_drag(ui, &response);
     }
 
     fn sphere_drag(&mut self, ui: &Ui, response: &egui::Response, disc: Rect) {
         let light = &mut self.settings.light;
         if response.double_clicked() {
             *light = SphereLight { point: light.point, ..SphereLight::default() };
-            self.settings.swipe = 0.5;
+            (self.settings.swipe, self.settings.orbit.zoom) = (0.5, 1.0);
         } else if response.dragged_by(egui::PointerButton::Primary)
             && let Some(at) = response.interact_pointer_pos()
         {
@@ -128,6 +142,30 @@ impl Viewer {
             self.ask_where(Purpose::Object, "");
             ui.close();
         }
+        ui.separator();
+        let fallback = Orbit::default();
+        let orbit = &mut self.settings.orbit;
+        let mut row = |label: &str, range, default: f32, help: &str, value: &mut f32| {
+            let mut shown = f64::from(*value);
+            if Number::new(label, range, f64::from(default), help).row_ui(ui, &mut shown) {
+                *value = narrow(shown);
+            }
+        };
+        row(
+            "Azimuth",
+            -3.15..=3.15,
+            fallback.azimuth,
+            "Of the eye about an object, radians",
+            &mut orbit.azimuth,
+        );
+        row(
+            "Elevation",
+            -1.5..=1.5,
+            fallback.elevation,
+            "Of the eye over an object, radians",
+            &mut orbit.elevation,
+        );
+        row("Zoom", 0.3..=6.0, fallback.zoom, "How large it is", &mut orbit.zoom);
     }
 
     /// An object on the device: left drag orbits, right drag and wheel zoom, Ctrl + drag turns the light.
@@ -194,6 +232,11 @@ impl Viewer {
             orbit.azimuth -= response.drag_delta().x * 0.008;
             orbit.elevation = (orbit.elevation + response.drag_delta().y * 0.008).clamp(-1.5, 1.5);
         }
+        self.zoom_drag(ui, response);
+    }
+
+    /// Wheel and right drag zoom.
+    fn zoom_drag(&mut self, ui: &Ui, response: &egui::Response) {
         let mut factor = 1.0;
         if response.hovered() {
             factor *= (0.004 * ui.input(|i| i.smooth_scroll_delta().y)).exp();
@@ -215,7 +258,37 @@ impl Viewer {
         let mut swipe = f64::from(self.settings.swipe);
         let number = Number::new("Swipe", 0.0..=1.0, 0.5, "Where truth ends and prediction begins");
         if number.row_ui(ui, &mut swipe) {
-            self.settings.swipe = super::widgets::narrow(swipe);
+            self.settings.swipe = narrow(swipe);
+        }
+        let degrees = |ui: &mut Ui, label: &str, help: &str, value: &mut f64| {
+            let mut shown = value.to_degrees();
+            let mut number = Number::new(label, -180.0..=180.0, 0.0, help);
+            number.suffix = "°";
+            if number.row_ui(ui, &mut shown) {
+                *value = shown.to_radians();
+            }
+        };
+        if light.point {
+            let fallback = SphereLight::default().at;
+            let mut at = light.at;
+            let mut changed = false;
+            for (k, name) in ["Light x", "Light y"].into_iter().enumerate() {
+                let number =
+                    Number::new(name, -1.0..=1.0, fallback[k], "Where the light stands over the disc");
+                changed |= number.row_ui(ui, &mut at[k]);
+            }
+            if changed {
+                let scale = at[0].hypot(at[1]).max(1.0);
+                light.at = at.map(|x| x / scale);
+            }
+        } else {
+            degrees(ui, "Turned", "The environment about the vertical axis", &mut light.yaw);
+            degrees(
+                ui,
+                "Tilted",
+                "The environment about the horizontal axis, of the sphere only",
+                &mut light.pitch,
+            );
         }
         ui.separator();
         if ui.button("Environment map…").clicked() {
@@ -246,15 +319,29 @@ fn square(rect: Rect) -> Rect {
     Rect::from_center_size(rect.center(), egui::Vec2::splat(rect.size().min_elem().max(1.0)))
 }
 
-/// The part of a picture between two vertical lines.
-fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, left: f32, right: f32) {
+/// The part of a picture between two vertical lines, within `clip`.
+fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, [left, right]: [f32; 2], clip: Rect) {
     if right <= left {
         return;
     }
     let u = |x: f32| (x - rect.left()) / rect.width();
     let uv = Rect::from_min_max(pos2(u(left), 0.0), pos2(u(right), 1.0));
     let area = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
-    ui.painter().image(texture.id(), area, uv, Color32::WHITE);
+    ui.painter().with_clip_rect(clip).image(texture.id(), area, uv, Color32::WHITE);
+}
+
+/// A whole picture of a sphere, within `clip`.
+fn whole(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
+    part(ui, texture, rect, [rect.left(), rect.right()], clip);
+    rim_ui(ui, rect, clip, texture.size()[0]);
+}
+
+/// Hides the steps of a sphere's last one and a half pixels, of `pixels` across, under a smooth ring of the background.
+fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, pixels: usize) {
+    let radius = 0.5 * disc.width();
+    let stroke =
+        egui::Stroke::new(6.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
+    ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), radius, stroke);
 }
 
 fn footer_ui(ui: &mut Ui, area: Rect, shown: &ShownSpheres, mode: SphereShown) {

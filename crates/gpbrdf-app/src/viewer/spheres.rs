@@ -112,11 +112,12 @@ pub(crate) struct SphereImages {
 /// A truth's pictures, kept while light and size stay.
 type Kept = Option<((DocumentId, SphereLight, u64, usize), Image)>;
 
-/// Starts the thread that renders; it lets the fitter go first.
+/// Starts the thread that renders, with workers of its own; beyond a coarse picture it lets the fitter go first.
 pub(crate) fn spawn(
     outbox: Outbox,
     busy: impl Fn() -> bool + Send + Sync + 'static,
 ) -> std::io::Result<Sender<SphereRequest>> {
+    let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
     let mut kept: [Kept; 3] = [None, None, None];
     let passes = [(COARSE, COARSE_PATCHES), (FINE, COARSE_PATCHES), (FINE, ENV_PATCHES)];
     Mailbox::spawn("spheres", move |request: SphereRequest, stale| {
@@ -127,10 +128,12 @@ pub(crate) fn spawn(
                 }
                 std::thread::sleep(Duration::from_millis(5));
             }
-            let Some(images) = make(&request, size, patches, &mut kept[i], stale) else { return };
+            let known = &mut kept[i];
+            let made = pool.install(|| make(&request, size, patches, known, stale));
+            let Some(images) = made else { return };
             outbox.send(Event::Spheres(Box::new(images)));
             let wanted = i == 1 && request.wants_metrics;
-            if let Some(images) = wanted.then(|| metrics(&request, stale)).flatten() {
+            if let Some(images) = wanted.then(|| pool.install(|| metrics(&request, stale))).flatten() {
                 let (document, version) = (request.key.document, request.key.version);
                 outbox.send(Event::Images { document, version, images: Box::new(images) });
             }
