@@ -12,6 +12,7 @@ use gpbrdf_core::{
 use super::plot::{Axis, Curve, curves};
 use super::table::Table;
 use crate::cli::report::cell_interval;
+use crate::cli::terminal::Terminal;
 
 /// What an experiment leaves: tables, and pictures by their file names.
 #[derive(Debug, Default)]
@@ -186,7 +187,7 @@ impl Context {
 ///
 /// # Errors
 /// A folder that cannot be read or holds none, or a damaged file.
-pub(super) fn measurements(folder: &Path) -> Result<Vec<Source>> {
+pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Source>> {
     let mut files = Vec::new();
     collect(folder, &mut files, 0)?;
     files.sort();
@@ -195,6 +196,7 @@ pub(super) fn measurements(folder: &Path) -> Result<Vec<Source>> {
         let extension = file.extension().map(|e| e.to_ascii_lowercase());
         let merl = extension.as_deref().is_some_and(|e| e == "binary");
         if merl && gpbrdf_core::merl_material_name(&gpbrdf_core::sha256_file(&file)?).is_none() {
+            terminal.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
             continue;
         }
         if merl || extension.as_deref().is_some_and(|e| e == "bsdf") {

@@ -97,11 +97,14 @@ fn dense_grid() -> Vec<View> {
     thetas.flat_map(|theta| (0..=90).map(move |j| (theta, (2.0 * f64::from(j)).to_radians()))).collect()
 }
 
+/// Values of `f` at views.
+type Predictor = dyn Fn(&[View]) -> Result<Vec<f64>>;
+
 struct Prediction {
     samples: Vec<View>,
     mae: f64,
     mse: f64,
-    predict: Box<dyn Fn(&[View]) -> Result<Vec<f64>>>,
+    predict: Box<Predictor>,
 }
 
 fn fit_model(model: &str, count: usize) -> Result<Prediction> {

@@ -141,7 +141,8 @@ impl Reproduce {
         if !(budget > 0.0 && budget.is_finite()) {
             bail!("--budget: expected a positive number of seconds, found {budget}");
         }
-        let measured = self.data.as_deref().map_or(Ok(Vec::new()), measurements)?;
+        let measured =
+            self.data.as_deref().map_or(Ok(Vec::new()), |folder| measurements(folder, terminal))?;
         for name in &self.materials {
             let known = measured.iter().any(|s| &s.name == name)
                 || built_in_materials().iter().any(|m| m.name == name);
