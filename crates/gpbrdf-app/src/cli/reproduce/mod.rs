@@ -44,7 +44,7 @@ pub(crate) struct Reproduce {
     /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
-    /// Seconds that one dense fit may be expected to take; decides its number of samples. [default: 60, or 3 with
+    /// Seconds that one dense fit may be expected to take; decides its number of samples. [default: 60, or 1 with
     /// --quick]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     budget: Option<f64>,
@@ -137,7 +137,7 @@ impl Experiment {
 impl Reproduce {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         OutputFolder::check(&self.output)?;
-        let budget = self.budget.unwrap_or(if self.quick { 3.0 } else { 60.0 });
+        let budget = self.budget.unwrap_or(if self.quick { 1.0 } else { 60.0 });
         if !(budget > 0.0 && budget.is_finite()) {
             bail!("--budget: expected a positive number of seconds, found {budget}");
         }
