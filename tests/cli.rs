@@ -14,5 +14,6 @@ mod cli {
     mod odd_input;
     mod process;
     mod render;
+    mod reproduce;
     mod usage;
 }

@@ -64,8 +64,8 @@ impl Default for LatticeLayout {
     }
 }
 
-/// How the sides of a lattice grow with its number of samples; the powers add up to 1.
-const SAMPLE_POWERS: [f64; 3] = [0.31, 0.31, 0.38];
+/// How the nodes along `phi` grow with the number of samples: faster than the others, whose power is half of the rest.
+const PHI_POWER: f64 = 0.38;
 
 impl LatticeLayout {
     /// Number of nodes.
@@ -90,7 +90,7 @@ impl LatticeLayout {
     }
 
     /// A lattice with about `samples` nodes, that of the default one in its proportions; with fewer samples the nodes
-    /// along `phi` thin out most, as the power 0.38 of their number, the others as the power 0.31.
+    /// along `phi` thin out most.
     ///
     /// # Errors
     /// Fewer than 12 samples.
@@ -103,7 +103,10 @@ impl LatticeLayout {
         let stretch = if symmetry == Symmetry::Reciprocal { 2.0 } else { 1.0 };
         let reference = [reference[0], reference[1], reference[2] * stretch];
         let scale = samples as f64 / reference.iter().product::<f64>();
-        let ideal = [0, 1, 2].map(|k| reference[k] * scale.powf(SAMPLE_POWERS[k]));
+        let along_phi = (reference[2] * scale.powf(PHI_POWER)).max(2.0);
+        // What is left to the plane of the other two, in the default's proportions.
+        let side = (samples as f64 / along_phi / (reference[0] * reference[1])).sqrt();
+        let ideal = [reference[0] * side, reference[1] * side, along_phi];
         // Among the roundings of the three sides, the product nearest to the request.
         let mut best = ([2, 2, 2], f64::INFINITY);
         for corner in 0..8 {

@@ -76,7 +76,8 @@ mod target;
 mod test_data;
 
 pub use analytic::{
-    AnalyticBrdf, AshikhminShirley, Blinn, BlinnPhong, CookTorrance, Lambert, Phong, Sgd, Ward,
+    AnalyticBrdf, AshikhminShirley, Blinn, BlinnPhong, CookTorrance, Lambert, NEURAL_FLOATS, NeuralBrdf,
+    Phong, Sgd, Ward,
 };
 pub use angles::{BoxPoint, HalfDiff, direction, fold_phi_d, theta_d_max};
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
@@ -93,6 +94,7 @@ pub use formats::cornell::read_cornell;
 pub use formats::image_exr::write_image_exr;
 pub use formats::merl::{MERL_BYTES, read_merl, write_merl, write_merl_to};
 pub use formats::merl_sha256::merl_material_name;
+pub use formats::neural_csv::read_neural_csv;
 pub use formats::rgl::{RglBrdf, read_rgl};
 pub use formats::samples_csv::{
     Directions, read_directions_csv, read_samples_csv, write_samples_csv, write_samples_csv_to,

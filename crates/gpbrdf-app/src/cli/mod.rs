@@ -13,6 +13,7 @@ mod model_args;
 mod predict;
 mod render;
 mod report;
+mod reproduce;
 mod shader;
 mod slice;
 mod terminal;
@@ -56,6 +57,8 @@ enum Command {
     Render(Box<render::Render>),
     /// Write any source as .binary, .exr or .csv.
     Convert(convert::Convert),
+    /// The paper's experiments, as tables and pictures.
+    Reproduce(reproduce::Reproduce),
     /// The lookup of a baked texture as shader code for other renderers.
     Shader(shader::Shader),
     /// What a file or a built-in material is.
@@ -89,6 +92,7 @@ pub fn main() -> ExitCode {
         Command::Slice(command) => command.run(&terminal),
         Command::Render(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
+        Command::Reproduce(command) => command.run(&terminal),
         Command::Shader(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),

@@ -6,6 +6,7 @@ pub(crate) mod merl;
 pub(crate) mod merl_sha256;
 #[cfg(test)]
 pub(crate) mod mutate;
+pub(crate) mod neural_csv;
 pub(crate) mod rgl;
 pub(crate) mod samples_csv;
 pub(crate) mod table_exr;

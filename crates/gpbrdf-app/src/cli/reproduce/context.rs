@@ -1,0 +1,227 @@
+//! What all experiments share: options, materials, and the comparison of a model with its truth.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context as _, Result, bail};
+use gpbrdf_core::{
+    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, NeuralBrdf, Provenance,
+    SampleSet, Source, bake_mean, bake_sigma, dense_cost, detect_symmetry, fit,
+};
+
+use super::plot::{Axis, Curve, curves};
+use super::table::Table;
+use crate::cli::report::cell_interval;
+use crate::cli::terminal::Terminal;
+
+/// What an experiment leaves: tables, and pictures by their file names.
+#[derive(Debug, Default)]
+pub(super) struct Outcome {
+    pub(super) tables: Vec<Table>,
+    pub(super) figures: Vec<(String, Vec<u8>)>,
+}
+
+impl Outcome {
+    /// Adds curves as an SVG file.
+    pub(super) fn plot(
+        &mut self,
+        file: &str,
+        title: &str,
+        x: Axis<'_>,
+        y: Axis<'_>,
+        of: &[Curve],
+    ) -> Result<()> {
+        self.figures.push((file.to_owned(), curves(title, x, y, of)?.into_bytes()));
+        Ok(())
+    }
+
+    /// Adds a picture as a PNG file.
+    pub(super) fn picture(&mut self, file: String, picture: &gpbrdf_core::Picture) -> Result<()> {
+        let mut bytes = Vec::new();
+        picture.write_png(&mut bytes).with_context(|| format!("cannot draw \"{file}\""))?;
+        self.figures.push((file, bytes));
+        Ok(())
+    }
+}
+
+/// The materials of the paper's table 2, and the one of its figures.
+pub(super) const PAPER_MATERIALS: [&str; 7] = [
+    "red-plastic",
+    "purple-paint",
+    "blue-rubber",
+    "blue-metallic-paint",
+    "silver-paint",
+    "violet-rubber",
+    "cherry-235",
+];
+
+/// Evaluations of likelihood and gradient that a dense search is taken to need.
+const DENSE_EVALUATIONS: usize = 40;
+
+/// The largest dense run, whatever the budget: its matrix takes 3.2 GB.
+const MAX_DENSE: usize = 20_000;
+
+#[derive(Debug)]
+pub(super) struct Context {
+    pub(super) quick: bool,
+    /// Seconds for one dense fit.
+    pub(super) budget: f64,
+    pub(super) environment: Environment,
+    /// The measurements found with `--data`.
+    pub(super) measured: Vec<Source>,
+    /// Restriction to these materials, where there is one.
+    pub(super) only: Vec<String>,
+    pub(super) neural: Vec<(String, NeuralBrdf)>,
+}
+
+/// A fitted model, its table and how it compares.
+#[derive(Debug)]
+pub(super) struct Fitted {
+    pub(super) model: Model,
+    pub(super) mean: BrdfTable,
+    pub(super) metrics: Metrics,
+    pub(super) fit_seconds: f64,
+}
+
+impl Context {
+    fn wanted(&self, name: &str) -> bool {
+        self.only.is_empty() || self.only.iter().any(|only| only == name)
+    }
+
+    /// The paper's materials: the user's MERL files where there are some, else reconstructions.
+    pub(super) fn paper_materials(&self) -> Result<Vec<(String, String, BrdfTable)>> {
+        let mut found = Vec::new();
+        for name in PAPER_MATERIALS.into_iter().filter(|name| self.wanted(name)) {
+            let file = self.measured.iter().find(|s| s.name == name && s.kind.contains("MERL"));
+            let built_in;
+            let source = match file {
+                Some(source) => source,
+                None => {
+                    built_in = Source::built_in(name)?;
+                    &built_in
+                }
+            };
+            let origin = if file.is_some() { "MERL" } else { "reconstructed from a published fit" };
+            found
+                .extend(source.table().map(|table| (name.to_owned(), origin.to_owned(), table.into_owned())));
+        }
+        if found.is_empty() {
+            bail!(
+                "--materials: expected at least one of {}, found {}",
+                PAPER_MATERIALS.join(", "),
+                self.only.join(", ")
+            );
+        }
+        Ok(found)
+    }
+
+    /// The measurements of `--data`, or the paper's materials without any.
+    pub(super) fn all_materials(&self) -> Result<Vec<(String, String, BrdfTable)>> {
+        let measured = self.measured.iter().filter(|source| self.wanted(&source.name));
+        let tables = measured.filter_map(|s| Some((s.name.clone(), s.kind.clone(), s.table()?.into_owned())));
+        let tables: Vec<_> = if self.quick { tables.take(3).collect() } else { tables.collect() };
+        if !tables.is_empty() {
+            return Ok(tables);
+        }
+        let mut tables = self.paper_materials()?;
+        if self.quick {
+            tables.truncate(2);
+        }
+        Ok(tables)
+    }
+
+    /// The largest number of samples whose dense fit with `terms` kernels keeps to the budget of time.
+    pub(super) fn dense_samples(&self, terms: usize) -> usize {
+        let fits = |n: usize| {
+            let cost = dense_cost(n, 3, DENSE_EVALUATIONS * terms);
+            cost.seconds <= self.budget && cost.check().is_ok()
+        };
+        let (mut low, mut high) = (64, MAX_DENSE);
+        while low + 1 < high {
+            let middle = usize::midpoint(low, high);
+            if fits(middle) { low = middle } else { high = middle }
+        }
+        low
+    }
+
+    /// Samples a table on the default lattice of about `count` nodes.
+    pub(super) fn lattice_samples(truth: &BrdfTable, count: usize) -> Result<SampleSet> {
+        let lattice = LatticeLayout::with_samples(count, detect_symmetry(truth))?;
+        Ok(SampleSet::measure(truth, &Layout::Lattice(lattice))?)
+    }
+
+    /// Fits a model to samples, bakes it and compares it with the truth; `interval` bakes sigma for the coverage.
+    pub(super) fn fit_and_compare(
+        &self,
+        truth: &BrdfTable,
+        samples: &SampleSet,
+        options: &FitOptions,
+        interval: bool,
+    ) -> Result<Fitted> {
+        let start = Instant::now();
+        let (model, _) = fit(samples, options, Provenance::default())?;
+        self.compare(truth, model, start.elapsed().as_secs_f64(), interval)
+    }
+
+    /// Bakes a model and compares it with the truth.
+    pub(super) fn compare(
+        &self,
+        truth: &BrdfTable,
+        model: Model,
+        fit_seconds: f64,
+        interval: bool,
+    ) -> Result<Fitted> {
+        let mean = bake_mean(&model);
+        let metrics = if interval {
+            let (sigma, noise) = (bake_sigma(&model), model.noise_variances());
+            let of = |cell: usize| cell_interval(&model, noise, &mean, &sigma, cell);
+            Metrics::new(truth, &mean, &self.environment, Some(&of))?
+        } else {
+            Metrics::new(truth, &mean, &self.environment, None)?
+        };
+        Ok(Fitted { model, mean, metrics, fit_seconds })
+    }
+}
+
+/// Every file under `folder` that is an RGL measurement or one of the 100 published MERL tables, sorted by name.
+///
+/// # Errors
+/// A folder that cannot be read or holds none, or a damaged file.
+pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Source>> {
+    let mut files = Vec::new();
+    collect(folder, &mut files, 0)?;
+    files.sort();
+    let mut sources = Vec::new();
+    for file in files {
+        let extension = file.extension().map(|e| e.to_ascii_lowercase());
+        let merl = extension.as_deref().is_some_and(|e| e == "binary");
+        if merl && gpbrdf_core::merl_material_name(&gpbrdf_core::sha256_file(&file)?).is_none() {
+            terminal.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
+            continue;
+        }
+        if merl || extension.as_deref().is_some_and(|e| e == "bsdf") {
+            sources.push(Source::open(&file)?);
+        }
+    }
+    if sources.is_empty() {
+        bail!(
+            "--data \"{}\": expected .bsdf files or published MERL .binary files, found none",
+            folder.display()
+        );
+    }
+    Ok(sources)
+}
+
+/// The files below a folder, three levels deep.
+fn collect(folder: &Path, files: &mut Vec<PathBuf>, depth: usize) -> Result<()> {
+    let failed = || format!("cannot read folder \"{}\"", folder.display());
+    for entry in std::fs::read_dir(folder).with_context(failed)? {
+        let path = entry.with_context(failed)?.path();
+        if path.is_dir() && depth < 3 {
+            collect(&path, files, depth + 1)?;
+        } else if path.is_file() {
+            files.push(path);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,211 @@
+//! `gpbrdf-cli reproduce`: the paper's experiments, each a table and pictures.
+
+mod beyond;
+mod context;
+mod hemisphere;
+mod kernels;
+mod materials;
+mod paper_lattice;
+mod pictures;
+mod plot;
+mod sampling;
+mod store;
+mod table;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use gpbrdf_core::{materials as built_in_materials, read_neural_csv, sha256_file};
+use serde_json::{Value, json};
+
+use super::input::{OutputFolder, environment};
+use super::terminal::Terminal;
+use context::{Context, Outcome, measurements};
+
+#[derive(Args, Debug)]
+pub(crate) struct Reproduce {
+    /// Experiments to run. [default: all]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    only: Vec<Experiment>,
+    /// Smaller settings: a few minutes in all.
+    #[arg(long)]
+    quick: bool,
+    /// Folder of measurements: RGL .bsdf files, and MERL .binary files, which are recognised by their sha256.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Only these materials, by name.
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    materials: Vec<String>,
+    /// Weights of Neural BRDF fits to compare with, 675 a material.
+    #[arg(long, value_name = "FILE")]
+    nbrdf: Option<PathBuf>,
+    /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
+    #[arg(long, value_name = "FILE")]
+    env: Option<PathBuf>,
+    /// Seconds that one dense fit may be expected to take; decides its number of samples. [default: 60, or 1 with
+    /// --quick]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    budget: Option<f64>,
+    /// Folder for the outputs; what it holds already of the same options is not computed again.
+    #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
+    output: PathBuf,
+}
+
+/// The experiments, in the order of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Experiment {
+    /// Analytic models under one light (figure 1 with it).
+    Table1,
+    /// Error and time against the sampling rate.
+    Figure2,
+    /// The paper's materials.
+    Table2,
+    /// Kernels.
+    Table3,
+    /// Spheres, slices and pixel differences.
+    Figures345,
+    /// Neural BRDF, sampling curve, calibration.
+    Beyond,
+}
+
+impl Experiment {
+    const ALL: [Self; 6] =
+        [Self::Table1, Self::Figure2, Self::Table2, Self::Table3, Self::Figures345, Self::Beyond];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Table1 => "table1",
+            Self::Figure2 => "figure2",
+            Self::Table2 => "table2",
+            Self::Table3 => "table3",
+            Self::Figures345 => "figures345",
+            Self::Beyond => "beyond",
+        }
+    }
+
+    fn run(self, context: &Context) -> Result<Outcome> {
+        match self {
+            Self::Table1 => hemisphere::run(context),
+            Self::Figure2 => sampling::run(context),
+            Self::Table2 => materials::run(context),
+            Self::Table3 => kernels::run(context),
+            Self::Figures345 => pictures::run(context),
+            Self::Beyond => beyond::run(context),
+        }
+    }
+
+    /// Expected seconds, within a factor of three on a machine of two cores: dense fits take their budget and, to bake,
+    /// half of it again; a lattice fit with table, pictures and metrics takes some seconds.
+    fn seconds(self, context: &Context) -> f64 {
+        const LATTICE: f64 = 4.0;
+        let dense = 1.5 * context.budget + LATTICE;
+        let paper = context::PAPER_MATERIALS.len() as f64;
+        let paper = if context.only.is_empty() { paper } else { paper.min(context.only.len() as f64) };
+        let all = if context.measured.is_empty() { paper } else { context.measured.len() as f64 };
+        let quick = context.quick;
+        match self {
+            Self::Table1 => {
+                if quick {
+                    8.0
+                } else {
+                    90.0
+                }
+            }
+            Self::Figure2 => {
+                if quick {
+                    4.0 * LATTICE + 1.5 * dense
+                } else {
+                    12.0 * LATTICE + 2.0 * dense
+                }
+            }
+            Self::Table2 => paper * (dense + LATTICE),
+            Self::Table3 => 6.0 * (dense + 2.0 * LATTICE),
+            Self::Figures345 => paper * LATTICE * if quick { 1.0 } else { 3.0 },
+            Self::Beyond => {
+                if quick {
+                    2.0 * 7.0 * LATTICE
+                } else {
+                    all * 10.0 * LATTICE
+                }
+            }
+        }
+    }
+}
+
+impl Reproduce {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        OutputFolder::check(&self.output)?;
+        let budget = self.budget.unwrap_or(if self.quick { 1.0 } else { 60.0 });
+        if !(budget > 0.0 && budget.is_finite()) {
+            bail!("--budget: expected a positive number of seconds, found {budget}");
+        }
+        let measured =
+            self.data.as_deref().map_or(Ok(Vec::new()), |folder| measurements(folder, terminal))?;
+        for name in &self.materials {
+            let known = measured.iter().any(|s| &s.name == name)
+                || built_in_materials().iter().any(|m| m.name == name);
+            if !known {
+                bail!(
+                    "--materials: expected names of materials of --data or built-in ones, found \"{name}\""
+                );
+            }
+        }
+        let context = Context {
+            quick: self.quick,
+            budget,
+            environment: environment(self.env.as_deref())?,
+            only: self.materials.clone(),
+            neural: self.nbrdf.as_deref().map_or(Ok(Vec::new()), read_neural_csv)?,
+            measured,
+        };
+        let key = self.key(&context)?;
+        let chosen = |e: &Experiment| self.only.is_empty() || self.only.contains(e);
+        let (done, open): (Vec<_>, Vec<_>) = Experiment::ALL
+            .into_iter()
+            .filter(chosen)
+            .partition(|e| store::is_done(&self.output, e.name(), &key));
+        for experiment in done {
+            terminal.summary(&format!("{}: taken from \"{}\"", experiment.name(), self.output.display()))?;
+        }
+        let mut left: f64 = open.iter().map(|e| e.seconds(&context)).sum();
+        if left > 0.0 {
+            terminal.note(&format!("about {left:.0} s; what is done is kept when interrupted"));
+        }
+        for experiment in open {
+            let start = Instant::now();
+            let outcome = terminal.stage(experiment.name(), || experiment.run(&context))?;
+            let seconds = start.elapsed().as_secs_f64();
+            for table in &outcome.tables {
+                terminal.summary(&table.markdown())?;
+            }
+            let files = store::write(&self.output, experiment.name(), &key, seconds, outcome)?;
+            terminal.summary(&format!(
+                "{}: {seconds:.1} s, {files} files in \"{}\"",
+                experiment.name(),
+                self.output.display()
+            ))?;
+            left -= experiment.seconds(&context);
+            if left > 1.0 {
+                terminal.note(&format!("about {left:.0} s left"));
+            }
+        }
+        Ok(())
+    }
+
+    /// What results depend on: options and the sums of the inputs.
+    fn key(&self, context: &Context) -> Result<Value> {
+        let sum = |file: &Option<PathBuf>| file.as_ref().map(sha256_file).transpose();
+        let measured: Vec<&str> = context.measured.iter().map(|s| s.sha256.as_str()).collect();
+        Ok(json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "quick": self.quick,
+            "budget": context.budget,
+            "materials": self.materials,
+            "measurements": measured,
+            "nbrdf": sum(&self.nbrdf)?,
+            "env": sum(&self.env)?,
+        }))
+    }
+}

@@ -1,0 +1,69 @@
+//! The paper's own setting: its lattice of table cells, its kernel, and what of it a dense solver can hold.
+
+use gpbrdf_core::{
+    Brdf, BrdfTable, FitOptions, HalfDiff, InputSpace, MeanFunction, N_PHI_D, N_THETA_D, N_THETA_H,
+    SampleSet, Shape, Solver, Transform, cell_center,
+};
+
+/// Every fifth `theta_h`, third `theta_d` and second `phi_d` cell, those above the horizon: the paper counts 37,616.
+pub(super) fn paper_cells() -> Vec<HalfDiff> {
+    let mut cells = Vec::new();
+    for h in (0..N_THETA_H).step_by(5) {
+        for d in (0..N_THETA_D).step_by(3) {
+            let row = (0..N_PHI_D).step_by(2).map(|p| cell_center(h, d, p));
+            cells.extend(row.filter(|angles| angles.is_above_horizon()));
+        }
+    }
+    cells
+}
+
+/// `count` of the paper's cells, spread evenly over them: those whose index times the golden ratio has the smallest
+/// fractions.
+pub(super) fn paper_samples(truth: &BrdfTable, count: usize) -> SampleSet {
+    let cells = paper_cells();
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    let fraction = |i: usize| (i as f64 * 0.618_033_988_749_894_9).fract();
+    order.sort_by(|&a, &b| fraction(a).total_cmp(&fraction(b)));
+    order.truncate(count);
+    order.sort_unstable();
+    let angles: Vec<HalfDiff> = order.into_iter().map(|i| cells[i]).collect();
+    let values = angles.iter().map(|&a| truth.eval_half_diff(a)).collect();
+    SampleSet { angles, values, lattice: None, layout: "cells" }
+}
+
+/// Identity transform, zero mean, kernels on the plain half-difference angles, dense.
+pub(super) fn paper_options(kernel: Vec<Shape>) -> FitOptions {
+    FitOptions {
+        solver: Solver::Dense,
+        kernel,
+        transform: Transform::Identity,
+        mean: MeanFunction::Zero,
+        space: InputSpace::HalfDiff,
+        ..FitOptions::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_s_lattice_has_about_its_count_and_is_thinned_evenly() {
+        let cells = paper_cells();
+        assert!((37_000..38_500).contains(&cells.len()), "{}", cells.len());
+        let table = BrdfTable::from_fn(|a| [a.theta_h, a.theta_d, a.phi_d]);
+        let samples = paper_samples(&table, 500);
+        assert_eq!((samples.angles.len(), samples.values.len()), (500, 500));
+        let mean = |of: &dyn Fn(&HalfDiff) -> f64, all: &[HalfDiff]| {
+            all.iter().map(of).sum::<f64>() / all.len() as f64
+        };
+        for of in [|a: &HalfDiff| a.theta_h, |a: &HalfDiff| a.theta_d, |a: &HalfDiff| a.phi_d] {
+            let (some, all) = (mean(&of, &samples.angles), mean(&of, &cells));
+            assert!((some - all).abs() < 0.05, "{some} {all}");
+        }
+        // A value is that of its cell.
+        let (a, v) = (samples.angles[77], samples.values[77]);
+        assert!((a.theta_h - v[0]).abs() < 1e-6 && (a.theta_d - v[1]).abs() < 1e-6);
+        assert_eq!(paper_samples(&table, usize::MAX).angles.len(), cells.len());
+    }
+}

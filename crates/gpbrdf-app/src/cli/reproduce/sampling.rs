@@ -1,0 +1,77 @@
+//! Figure 2: error and time of the fit against the sampling rate.
+
+use anyhow::Result;
+use gpbrdf_core::{FitOptions, Layout, N_CELLS, SampleSet, Solver};
+use serde_json::json;
+
+use super::context::{Context, Outcome};
+use super::plot::{Axis, Curve};
+use super::table::{Table, number};
+
+/// Percent of the cells of a table.
+const RATES: [f64; 9] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 2.58, 5.0, 10.0];
+const QUICK_RATES: [f64; 4] = [0.05, 0.2, 1.0, 2.58];
+
+/// Of all cells of a table, `rate` percent.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rates are in 0 to 10")]
+fn samples_of(rate: f64) -> usize {
+    (rate / 100.0 * N_CELLS as f64).round() as usize
+}
+
+pub(super) fn run(context: &Context) -> Result<Outcome> {
+    let materials = context.paper_materials()?;
+    let Some((name, origin, truth)) = materials.last() else { return Ok(Outcome::default()) };
+    let mut table = Table::new(
+        "figure2",
+        format!("Figure 2: error and time against the sampling rate, {name} ({origin})"),
+        &["solver", "rate %", "samples", "MAE", "MSE", "median ln", "PSNR env", "fit s"],
+    );
+    let names = ["lattice", "dense, random cells"];
+    let mut errors = names.map(|name| Curve { name: name.into(), points: Vec::new() });
+    let mut times = errors.clone();
+    let most = context.dense_samples(1);
+    let rates = if context.quick { &QUICK_RATES[..] } else { &RATES[..] };
+    for (k, name) in names.into_iter().enumerate() {
+        let mut wanted: Vec<usize> = rates.iter().map(|&rate| samples_of(rate)).collect();
+        if k == 1 {
+            wanted.retain(|&n| n < most);
+            wanted.push(most);
+        }
+        for count in wanted {
+            let (samples, options) = if k == 0 {
+                (Context::lattice_samples(truth, count)?, FitOptions::default())
+            } else {
+                let samples = SampleSet::measure(truth, &Layout::Cells { count, seed: 0 })?;
+                (samples, FitOptions { solver: Solver::Dense, ..FitOptions::default() })
+            };
+            let fitted = context.fit_and_compare(truth, &samples, &options, false)?;
+            let (cells, n) = (&fitted.metrics.cells, samples.angles.len());
+            let rate = 100.0 * n as f64 / N_CELLS as f64;
+            errors[k].points.push((rate, cells.mae));
+            times[k].points.push((rate, fitted.fit_seconds));
+            table.rows.push(vec![
+                json!(name),
+                number(rate),
+                json!(n),
+                number(cells.mae),
+                number(cells.mse),
+                number(cells.median_abs_log),
+                number(fitted.metrics.images.psnr_env),
+                number(fitted.fit_seconds),
+            ]);
+        }
+    }
+    table.note(format!(
+        "Rates are of all 1,458,000 cells, as in the paper. The dense solver stops at {most} samples, the most that a budget of {} s \
+         is expected to hold. Both fit ln(f + 0.001) by a Matern 5/2 kernel; times are those of this machine.",
+        context.budget
+    ));
+    let mut outcome = Outcome::default();
+    let x = Axis { name: "sampling rate, %", logarithmic: true };
+    let y = Axis { name: "MAE, 1/sr", logarithmic: true };
+    outcome.plot("figure2-error.svg", "Figure 2: error", x, y, &errors)?;
+    let y = Axis { name: "fit, s", logarithmic: true };
+    outcome.plot("figure2-time.svg", "Figure 2: time of the fit", x, y, &times)?;
+    outcome.tables.push(table);
+    Ok(outcome)
+}
