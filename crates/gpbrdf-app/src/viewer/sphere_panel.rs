@@ -18,14 +18,12 @@ const OBJECT_HELP: &str = "Object view: drag orbits";
 impl Viewer {
     /// The sphere and its controls.
     pub(crate) fn sphere_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("3-D").strong().size(15.0));
             ui.add_space(6.0);
-            ui.scope(|ui| segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.menu_button("Light", |ui| self.light_ui(ui));
-                ui.menu_button("Shape", |ui| self.shape_ui(ui));
-            });
+            segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name);
+            ui.menu_button("Shape", |ui| self.shape_ui(ui));
+            ui.menu_button("Light", |ui| self.light_ui(ui));
         });
         let Some(id) = self.document().map(|d| d.id) else { return };
         let area = ui.available_rect_before_wrap();

@@ -1,6 +1,6 @@
 //! The line at the foot of the window.
 
-use eframe::egui::{self, RichText, Ui};
+use eframe::egui::{RichText, Ui};
 
 use super::app::Viewer;
 use super::document::Work;
@@ -10,7 +10,7 @@ impl Viewer {
     /// What is open, how good it is, how long it took.
     pub(crate) fn status_ui(&mut self, ui: &mut Ui) {
         let frame = self.frames_text();
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             if let Some(document) = self.document() {
                 ui.label(RichText::new(&document.name).strong());
                 ui.separator();
@@ -34,9 +34,8 @@ impl Viewer {
             } else {
                 ui.label("Nothing is open");
             }
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.weak(frame).on_hover_text("The window's own work in the last frame");
-            });
+            ui.separator();
+            ui.weak(frame).on_hover_text("The window's own work in the last frame");
         });
     }
 
