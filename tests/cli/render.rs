@@ -47,6 +47,7 @@ fn wrong_requests_are_refused_and_leave_nothing() {
     for (arguments, part) in [
         (&["render", "--scene", "torus"][..], "expected sphere, knot, box or an .obj file, found \"torus\""),
         (&["render", "--scene", "bad.obj"], "OBJ file \"bad.obj\": expected"),
+        (&["render", "--scene", "missing.obj"], "cannot read \"missing.obj\""),
         (&["render", "-o", "a.jpg"], "ends in .png or .exr"),
         (&["render", "--compare", "-o", "a.exr"], "expected a .png file"),
         (&["render", "--size", "99999999x2"], "found 99999999 x 2"),

@@ -267,7 +267,11 @@ impl Render {
             Some("sphere") => (Geometry::Sphere, [0.0, 0.0]),
             Some("knot") => (Geometry::Mesh(Mesh::knot()), [8.0, -10.0]),
             Some("box") => (Geometry::Mesh(Mesh::rounded_box()), [-33.0, 28.0]),
-            _ if self.scene.exists() => (Geometry::Mesh(read_obj(&self.scene)?), [0.0, 10.0]),
+            _ if self.scene.exists()
+                || self.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) =>
+            {
+                (Geometry::Mesh(read_obj(&self.scene)?), [0.0, 10.0])
+            }
             _ => bail!(
                 "--scene: expected sphere, knot, box or an .obj file, found \"{}\"",
                 self.scene.display()
