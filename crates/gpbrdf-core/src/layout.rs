@@ -21,6 +21,19 @@ pub enum Symmetry {
     Reciprocal,
 }
 
+impl Symmetry {
+    /// The length of the axis of `phi`: `pi/2` where it is folded, else `pi`.
+    pub(crate) fn phi_extent(self) -> f64 {
+        match self {
+            Self::Bilateral => FRAC_PI_2,
+            Self::Reciprocal => PI,
+        }
+    }
+}
+
+/// The exponent of nodes along a folded `phi` where there are enough of them; what others reach is in `docs/results.md`.
+pub(crate) const PHI_DENSITY: f64 = 1.5;
+
 /// A product lattice in the warped box, `A x B x C` nodes along `u`, `v` and `phi`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LatticeLayout {
@@ -59,7 +72,7 @@ impl Default for LatticeLayout {
             v_density: 0.65,
             v_max: 0.97,
             symmetry: Symmetry::Bilateral,
-            phi_density: 1.5,
+            phi_density: PHI_DENSITY,
         }
     }
 }
@@ -85,7 +98,7 @@ impl LatticeLayout {
     #[must_use]
     pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
         let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
-        let phi_density = (1.0 + shape[2] as f64 / 16.0).min(1.5);
+        let phi_density = (1.0 + shape[2] as f64 / 16.0).min(PHI_DENSITY);
         Self { shape, node_spread, phi_density, symmetry, ..Self::default() }
     }
 
@@ -178,10 +191,7 @@ impl LatticeLayout {
         let v =
             (0..self.shape[1]).map(|i| (i as f64 / (b - 1.0)).powf(self.v_density) * self.v_max).collect();
         // Half a step off the ends of a folded phi, where the mirrored kernel already knows that slopes vanish.
-        let period = match self.symmetry {
-            Symmetry::Bilateral => FRAC_PI_2,
-            Symmetry::Reciprocal => PI,
-        };
+        let period = self.symmetry.phi_extent();
         let phi_density = if self.symmetry == Symmetry::Bilateral { self.phi_density } else { 1.0 };
         let place = |t: f64| period * (1.0 - (1.0 - t).powf(phi_density));
         let phi = (0..self.shape[2]).map(|i| place((i as f64 + 0.5) / c)).collect();

@@ -45,10 +45,7 @@ impl InducingShape {
             (0..n).map(|i| low + (high - low) * i as f64 / (n - 1) as f64).collect()
         };
         let first = self.space.warp_u(0.5 / crate::table::N_THETA_H as f64);
-        let period = match self.symmetry() {
-            Symmetry::Bilateral => std::f64::consts::FRAC_PI_2,
-            Symmetry::Reciprocal => std::f64::consts::PI,
-        };
+        let period = self.symmetry().phi_extent();
         let phi = (0..c).map(|i| (i as f64 + 0.5) / c as f64 * period).collect();
         [between(first, self.space.warp_u(1.0), a), between(0.0, 1.0, b), phi]
     }

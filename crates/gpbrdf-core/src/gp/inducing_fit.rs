@@ -10,7 +10,7 @@ use super::inducing::{COMPONENT_CONSTANTS, InducingShape, SHARED_CONSTANTS, chec
 use super::regression::{Regression, regress};
 use crate::error::{Error, Result};
 use crate::kernel::{Kernel1d, Shape};
-use crate::layout::Symmetry;
+use crate::layout::{PHI_DENSITY, Symmetry};
 use crate::space::InputSpace;
 
 /// Ratio of noise to signal variance of the regression: small against thousands of cells a node, enough to keep nodes that
@@ -19,9 +19,6 @@ const REGRESSION_RATIO: f64 = 1e-5;
 
 /// Shapes are searched up to this many numbers; larger lattices keep the proportions found there.
 const LARGEST_SEARCH: usize = 1400;
-
-/// The density of nodes along a folded `phi`, as in the layout of samples.
-const PHI_DENSITY: f64 = 1.5;
 
 /// Largest sides: half of the table's cells along each axis, and all along `theta_h`.
 const LARGEST_SIDES: [usize; 3] = [90, 60, 30];
