@@ -33,6 +33,8 @@ pub(crate) struct CellGrid {
     pub(crate) targets: [Vec<f64>; 3],
     /// How much each point counts; adds up to `cells`.
     pub(crate) weights: Vec<f64>,
+    /// The part of the weights that goes by what shows in pictures.
+    pub(crate) shown: Vec<f64>,
     /// Valid cells of the table.
     pub(crate) cells: usize,
 }
@@ -78,13 +80,16 @@ impl CellGrid {
             phi: (0..rows).map(|j| cell_center(0, 0, j).phi_d).collect(),
             targets: std::array::from_fn(|_| vec![0.0; size]),
             weights: vec![0.0; size],
+            shown: vec![0.0; size],
             cells,
         };
         for (k, (points, _)) in columns.iter().enumerate() {
             for (l, point) in points.iter().enumerate() {
                 let at = (k / rows * N_THETA_D + l) * rows + k % rows;
-                let by_picture = if shown > 0.0 { picture * point.picture / shown } else { 0.0 };
-                grid.weights[at] = scale * ((1.0 - picture) * point.even / even + by_picture);
+                if shown > 0.0 {
+                    grid.shown[at] = scale * picture * point.picture / shown;
+                }
+                grid.weights[at] = scale * (1.0 - picture) * point.even / even + grid.shown[at];
                 (0..3).for_each(|c| grid.targets[c][at] = point.target[c]);
             }
         }
@@ -112,6 +117,7 @@ impl CellGrid {
             phi: thin(&self.phi, step_phi),
             targets: self.targets.each_ref().map(|t| pick(t)),
             weights: pick(&self.weights),
+            shown: pick(&self.shown),
             cells: self.cells,
         }
     }

@@ -149,6 +149,7 @@ fn components(grid: &CellGrid, offsets: [f64; 3], mix: [[f64; 3]; 3]) -> GridDat
         v: grid.v.clone(),
         phi: grid.phi.clone(),
         weights: grid.weights.clone(),
+        shown: grid.shown.clone(),
         components: std::array::from_fn(component),
     }
 }

@@ -2,12 +2,13 @@
 //!
 //! The whole table is at hand, with thousands of cells for each stored number, so nothing can be overfitted: the search
 //! minimises the weighted squared residual of the closed-form regression itself. Shapes grow greedily: the side of the
-//! component that lowers the residual most for each number more.
+//! component that lowers the residual most for each number more. What few numbers cannot follow leaves residuals with
+//! heavy tails, so weights are renewed as lattices grow; see [`heavy_tailed_weights`].
 
 use rayon::prelude::*;
 
 use super::inducing::{COMPONENT_CONSTANTS, InducingShape, SHARED_CONSTANTS, check_shape};
-use super::regression::{Regression, regress};
+use super::regression::{CardinalAxis, Regression, regress};
 use crate::error::{Error, Result};
 use crate::kernel::{Kernel1d, Shape};
 use crate::layout::{PHI_DENSITY, Symmetry};
@@ -20,6 +21,12 @@ const REGRESSION_RATIO: f64 = 1e-5;
 /// Shapes are searched up to this many numbers; larger lattices keep the proportions found there.
 const LARGEST_SEARCH: usize = 1400;
 
+/// Weights are renewed whenever lattices have grown by this factor.
+const RENEWAL: f64 = 1.6;
+
+/// Renewals of the weights of the full grid.
+const WEIGHT_STEPS: usize = 3;
+
 /// Largest sides: half of the table's cells along each axis, and all along `theta_h`.
 const LARGEST_SIDES: [usize; 3] = [90, 60, 30];
 
@@ -30,6 +37,8 @@ pub(crate) struct GridData {
     pub(crate) v: Vec<f64>,
     pub(crate) phi: Vec<f64>,
     pub(crate) weights: Vec<f64>,
+    /// The part of the weights that outliers keep.
+    pub(crate) shown: Vec<f64>,
     pub(crate) components: [Vec<f64>; 3],
 }
 
@@ -91,6 +100,8 @@ impl Candidate {
 /// The search on one grid.
 struct Search<'a> {
     data: &'a GridData,
+    /// The grid's weights, less where residuals were large.
+    weights: Vec<f64>,
     symmetry: Symmetry,
     kernel: Shape,
 }
@@ -98,7 +109,19 @@ struct Search<'a> {
 impl Search<'_> {
     fn regress(&self, candidate: &Candidate) -> Result<Regression> {
         let lattice = candidate.lattice(self.symmetry, self.kernel);
-        regress_on(&lattice, self.data, candidate.component, REGRESSION_RATIO)
+        regress_on(&lattice, self.data, &self.weights, candidate.component, REGRESSION_RATIO)
+    }
+
+    /// Renews the weights by what the candidates leave; their own residuals are void after it.
+    fn renew_weights(&mut self, candidates: &[Candidate]) -> Result<()> {
+        let mut squares = vec![0.0; self.data.weights.len()];
+        for candidate in candidates {
+            let values = self.regress(candidate)?.values;
+            let lattice = candidate.lattice(self.symmetry, self.kernel);
+            add_squares(&lattice, &values, self.data, candidate.component, &mut squares)?;
+        }
+        self.weights = heavy_tailed_weights(self.data, &squares);
+        Ok(())
     }
 
     /// The residual, infinite where the regression fails.
@@ -203,12 +226,60 @@ fn shapes_of(nodes: usize) -> Vec<[usize; 3]> {
 type Step = (Candidate, f64);
 
 /// One component's regression on a lattice.
-fn regress_on(lattice: &InducingShape, data: &GridData, component: usize, ratio: f64) -> Result<Regression> {
+fn regress_on(
+    lattice: &InducingShape,
+    data: &GridData,
+    weights: &[f64],
+    component: usize,
+    ratio: f64,
+) -> Result<Regression> {
+    let axes = cardinal_on(lattice, data)?;
+    regress(axes.each_ref(), weights, &data.components[component], ratio)
+}
+
+/// The cardinal functions of a lattice on the grid.
+fn cardinal_on(lattice: &InducingShape, data: &GridData) -> Result<[CardinalAxis; 3]> {
     let u: Vec<f64> = data.u.iter().map(|&u| lattice.space.warp_u(u)).collect();
     let v: Vec<f64> = data.v.iter().map(|&v| lattice.space.warp_v(v)).collect();
     let phi: Vec<f64> = data.phi.iter().map(|&phi| lattice.space.warp_phi(phi)).collect();
-    let axes = lattice.cardinal([&u, &v, &phi])?;
-    regress(axes.each_ref(), &data.weights, &data.components[component], ratio)
+    lattice.cardinal([&u, &v, &phi])
+}
+
+/// Adds the squared residuals of one component's values to those of the others. As colours are mixed by an orthogonal matrix,
+/// the sum of all three is that of the channels.
+fn add_squares(
+    lattice: &InducingShape,
+    values: &[f64],
+    data: &GridData,
+    component: usize,
+    squares: &mut [f64],
+) -> Result<()> {
+    let axes = cardinal_on(lattice, data)?;
+    let found = super::contract(axes.each_ref().map(|axis| axis.functions.as_ref()), values, 1);
+    for ((sum, found), target) in squares.iter_mut().zip(&found).zip(&data.components[component]) {
+        *sum += (found - target).powi(2);
+    }
+    Ok(())
+}
+
+/// Weights of one step of expectation maximisation for residuals that follow Student's t with one degree of freedom,
+/// `w / (1 + r^2 / s^2)` (K. Lange, R. Little and J. Taylor, "Robust Statistical Modeling Using the t Distribution", 1989),
+/// with `s^2` the median of `r^2`. What shows in pictures keeps its weight, the rest adds up to what it did.
+fn heavy_tailed_weights(data: &GridData, squares: &[f64]) -> Vec<f64> {
+    let counted = squares.iter().zip(&data.weights).filter(|(_, weight)| **weight > 0.0);
+    let mut sorted: Vec<f64> = counted.map(|(square, _)| *square).collect();
+    if sorted.is_empty() {
+        return data.weights.clone();
+    }
+    let middle = sorted.len() / 2;
+    let scale = sorted.select_nth_unstable_by(middle, f64::total_cmp).1.max(1e-24);
+    let points = data.weights.iter().zip(&data.shown).zip(squares);
+    let reduced: Vec<f64> =
+        points.map(|((weight, shown), square)| (weight - shown).max(0.0) / (1.0 + square / scale)).collect();
+    let before: f64 = data.weights.iter().zip(&data.shown).map(|(weight, shown)| weight - shown).sum();
+    let after: f64 = reduced.iter().sum();
+    let factor = if after > 0.0 { before / after } else { 1.0 };
+    reduced.iter().zip(&data.shown).map(|(reduced, shown)| factor * reduced + shown).collect()
 }
 
 /// How large the lattices may be.
@@ -239,7 +310,7 @@ pub(crate) fn fit_inducing(
     budget: Budget,
 ) -> Result<Vec<InducingFit>> {
     kernel.validate()?;
-    let search = Search { data: coarse, symmetry, kernel };
+    let mut search = Search { data: coarse, weights: coarse.weights.clone(), symmetry, kernel };
     let first = |component| Candidate {
         component,
         shape: SMALLEST,
@@ -253,12 +324,15 @@ pub(crate) fn fit_inducing(
         Budget::Shape(shape) => {
             check_shape(shape)?;
             for candidate in &mut candidates {
-                candidate.shape = shape;
                 // A large lattice is searched at a smaller size of the same proportions.
                 let searched = shrink(shape, LARGEST_SEARCH / 3);
-                let mut small = Candidate { shape: searched, ..candidate.clone() };
-                evaluations += search.best_logs(&mut small, 8);
-                candidate.logs = small.logs;
+                candidate.shape = searched;
+                evaluations += search.best_logs(candidate, 8);
+            }
+            search.renew_weights(&candidates)?;
+            for candidate in &mut candidates {
+                evaluations += search.refine(candidate, 0.2, 8);
+                candidate.shape = shape;
             }
         }
         Budget::Floats(floats) => {
@@ -267,7 +341,7 @@ pub(crate) fn fit_inducing(
                 return Err(Error::argument("number of floats", expected, floats));
             }
             let nodes = floats - SHARED_CONSTANTS - 3 * COMPONENT_CONSTANTS;
-            evaluations += grow(&search, &mut candidates, nodes.min(LARGEST_SEARCH));
+            evaluations += grow(&mut search, &mut candidates, nodes.min(LARGEST_SEARCH))?;
             if nodes > LARGEST_SEARCH {
                 enlarge(&mut candidates, nodes);
             }
@@ -276,22 +350,47 @@ pub(crate) fn fit_inducing(
             }
         }
     }
-    let fitted: Vec<Result<InducingFit>> = candidates
-        .iter()
-        .map(|candidate| finish(candidate.lattice(symmetry, kernel), fine, candidate.component, evaluations))
-        .collect();
-    fitted.into_iter().collect()
+    let lattices: Vec<InducingShape> =
+        candidates.iter().map(|candidate| candidate.lattice(symmetry, kernel)).collect();
+    let weights = renewed_weights(&lattices, fine)?;
+    let components = lattices.into_iter().enumerate();
+    components.map(|(k, lattice)| finish(lattice, fine, &weights, k, evaluations)).collect()
+}
+
+/// Weights of the full grid, as the values that they lead to leave them.
+fn renewed_weights(lattices: &[InducingShape], data: &GridData) -> Result<Vec<f64>> {
+    let mut weights = data.weights.clone();
+    for _ in 0..WEIGHT_STEPS {
+        let mut squares = vec![0.0; weights.len()];
+        for (component, lattice) in lattices.iter().enumerate() {
+            let values = regress_on(lattice, data, &weights, component, REGRESSION_RATIO)?.values;
+            add_squares(lattice, &values, data, component, &mut squares)?;
+        }
+        weights = heavy_tailed_weights(data, &squares);
+    }
+    Ok(weights)
 }
 
 /// Grows the lattices until no side more fits into `nodes` nodes in all.
-fn grow(search: &Search<'_>, candidates: &mut [Candidate], nodes: usize) -> usize {
+///
+/// # Errors
+/// Regressions that cannot be solved.
+fn grow(search: &mut Search<'_>, candidates: &mut [Candidate], nodes: usize) -> Result<usize> {
     let mut evaluations = 0;
     for candidate in candidates.iter_mut() {
         evaluations += search.settle(candidate, 3);
     }
+    let mut renewed_at = 0;
     // The gains of each component's three sides, until it changes.
     let mut options: Vec<Vec<Candidate>> = candidates.iter().map(|_| Vec::new()).collect();
     loop {
+        let used: usize = candidates.iter().map(Candidate::nodes).sum();
+        if used as f64 >= RENEWAL * renewed_at as f64 {
+            search.renew_weights(candidates)?;
+            renewed_at = used;
+            candidates.iter_mut().for_each(|candidate| candidate.residual = search.residual(candidate));
+            options.iter_mut().for_each(Vec::clear);
+        }
         for (k, candidate) in candidates.iter_mut().enumerate() {
             if candidate.nodes() as f64 >= 1.6 * candidate.searched_at as f64 {
                 evaluations += search.settle(candidate, 2);
@@ -312,7 +411,6 @@ fn grow(search: &Search<'_>, candidates: &mut [Candidate], nodes: usize) -> usiz
                 evaluations += options[k].len();
             }
         }
-        let used: usize = candidates.iter().map(Candidate::nodes).sum();
         let mut best: Option<(f64, usize, usize)> = None;
         for (k, candidate) in candidates.iter().enumerate() {
             for (o, option) in options[k].iter().enumerate() {
@@ -327,10 +425,11 @@ fn grow(search: &Search<'_>, candidates: &mut [Candidate], nodes: usize) -> usiz
         candidates[k] = options[k].swap_remove(o);
         options[k].clear();
     }
+    search.renew_weights(candidates)?;
     for candidate in candidates.iter_mut() {
         evaluations += search.settle(candidate, 6);
     }
-    evaluations
+    Ok(evaluations)
 }
 
 /// Enlarges lattices in proportion to `nodes` nodes in all, then side by side while there is room.
@@ -370,26 +469,30 @@ fn shrink(shape: [usize; 3], nodes: usize) -> [usize; 3] {
 fn finish(
     mut lattice: InducingShape,
     data: &GridData,
+    weights: &[f64],
     component: usize,
     evaluations: usize,
 ) -> Result<InducingFit> {
-    let Regression { values, penalised, explained, .. } =
-        regress_on(&lattice, data, component, REGRESSION_RATIO)?;
+    let Regression { values, explained, .. } =
+        regress_on(&lattice, data, weights, component, REGRESSION_RATIO)?;
     let n: f64 = data.weights.iter().sum();
-    let residual = (penalised / n).max(1e-12);
+    let mut squares = vec![0.0; weights.len()];
+    add_squares(&lattice, &values, data, component, &mut squares)?;
+    // Outliers count in the noise as much as the others.
+    let residual = (squares.iter().zip(&data.weights).map(|(r, w)| r * w).sum::<f64>() / n).max(1e-12);
     let axes = lattice.cardinal([&[], &[], &[]])?;
     let solved = super::contract(axes.each_ref().map(|axis| axis.inverse.as_ref()), &values, 1);
     let energy: f64 = solved.iter().zip(&values).map(|(a, b)| a * b).sum();
-    let unexplained = ((prior_trace(&lattice, data) - explained) / n).max(1e-15);
+    let unexplained = ((prior_trace(&lattice, data, weights) - explained) / n).max(1e-15);
     let likely = (energy / values.len() as f64).max(1e-12);
     lattice.signal_variance = likely.min(0.5 * residual / unexplained);
     lattice.noise_variance = residual - lattice.signal_variance * unexplained;
-    let bound = bound(&lattice, data, component)?;
+    let bound = bound(&lattice, data, weights, component)?;
     Ok(InducingFit { lattice, values, bound, evaluations })
 }
 
 /// `sum w(x) k(x, x)` without the signal variance.
-fn prior_trace(lattice: &InducingShape, data: &GridData) -> f64 {
+fn prior_trace(lattice: &InducingShape, data: &GridData, weights: &[f64]) -> f64 {
     let (metrics, mirrored) = (lattice.space.lattice_metrics(), lattice.space.mirrored());
     let variance = |k: usize, x: f64| {
         let kernel = &lattice.kernels[k];
@@ -398,7 +501,7 @@ fn prior_trace(lattice: &InducingShape, data: &GridData) -> f64 {
     };
     let along_phi: Vec<f64> = data.phi.iter().map(|&phi| variance(2, lattice.space.warp_phi(phi))).collect();
     let rest = variance(0, 0.0) * variance(1, 0.0);
-    data.weights
+    weights
         .chunks(along_phi.len())
         .map(|row| row.iter().zip(&along_phi).map(|(w, k)| w * k).sum::<f64>())
         .sum::<f64>()
@@ -409,10 +512,10 @@ fn prior_trace(lattice: &InducingShape, data: &GridData) -> f64 {
 ///
 /// # Errors
 /// A regression that cannot be solved.
-fn bound(lattice: &InducingShape, data: &GridData, component: usize) -> Result<f64> {
+fn bound(lattice: &InducingShape, data: &GridData, weights: &[f64], component: usize) -> Result<f64> {
     let (signal, noise) = (lattice.signal_variance, lattice.noise_variance);
-    let solved = regress_on(lattice, data, component, noise / signal)?;
-    let counted = data.weights.iter().filter(|w| **w > 0.0);
+    let solved = regress_on(lattice, data, weights, component, noise / signal)?;
+    let counted = weights.iter().filter(|w| **w > 0.0);
     let (mut n, mut log_noise) = (0.0, 0.0);
     for weight in counted {
         n += 1.0;
@@ -420,7 +523,7 @@ fn bound(lattice: &InducingShape, data: &GridData, component: usize) -> Result<f
     }
     let likelihood = -0.5
         * (n * (2.0 * std::f64::consts::PI).ln() + log_noise + solved.log_det + solved.penalised / noise);
-    Ok(likelihood - 0.5 * signal / noise * (prior_trace(lattice, data) - solved.explained))
+    Ok(likelihood - 0.5 * signal / noise * (prior_trace(lattice, data, weights) - solved.explained))
 }
 
 #[cfg(test)]
@@ -447,7 +550,7 @@ mod tests {
                 }
             }
         }
-        GridData { u, v, phi, weights, components }
+        GridData { u, v, phi, shown: vec![0.0; weights.len()], weights, components }
     }
 
     fn lattice(shape: [usize; 3]) -> InducingShape {
@@ -465,7 +568,7 @@ mod tests {
     #[test]
     fn the_bound_is_the_dense_one_and_stays_below_the_exact_likelihood() {
         let (data, lattice) = (data([6, 5, 4]), lattice([3, 2, 2]));
-        let found = bound(&lattice, &data, 0).unwrap();
+        let found = bound(&lattice, &data, &data.weights, 0).unwrap();
         // Dense, from the definitions.
         let points = [
             data.u.iter().map(|&u| lattice.space.warp_u(u)).collect::<Vec<_>>(),
@@ -497,7 +600,8 @@ mod tests {
         let exact = likelihood(&k_xx + &noise);
         assert!(found < exact, "{found} {exact}");
         // More nodes come closer to it.
-        let more = bound(&InducingShape { shape: [5, 4, 3], ..lattice.clone() }, &data, 0).unwrap();
+        let more =
+            bound(&InducingShape { shape: [5, 4, 3], ..lattice.clone() }, &data, &data.weights, 0).unwrap();
         assert!(found < more && more < exact, "{found} {more} {exact}");
     }
 
@@ -521,6 +625,33 @@ mod tests {
         const { assert!(SMALLEST_FLOATS <= 80) };
         let tiny = Budget::Floats(SMALLEST_FLOATS - 1);
         assert!(fit_inducing(&data, &data, Symmetry::Bilateral, Shape::Matern52, tiny).is_err());
+    }
+
+    #[test]
+    fn outliers_count_for_less_save_where_they_show() {
+        let mut grid = data([1, 1, 5]);
+        grid.weights = vec![1.0; 5];
+        grid.shown = vec![0.0, 0.0, 0.0, 0.0, 0.4];
+        // The median of the squares, the scale, is 4.
+        let weights = heavy_tailed_weights(&grid, &[0.0, 1.0, 4.0, 100.0, 400.0]);
+        let student = [1.0, 1.0 / 1.25, 0.5, 1.0 / 26.0, 0.6 / 101.0];
+        let factor = 4.6 / student.iter().sum::<f64>();
+        for (k, (found, student)) in weights.iter().zip(student).enumerate() {
+            assert!((found - factor * student - grid.shown[k]).abs() < 1e-14, "{k} {found}");
+        }
+        // A few points far off pull the values at the nodes less than they would.
+        let clean = data([12, 8, 6]);
+        let mut spoilt = clean.clone();
+        spoilt.components[0].iter_mut().step_by(41).for_each(|y| *y += 5.0);
+        let lattices = [lattice([5, 4, 3]); 1];
+        let values = |data: &GridData, weights: &[f64]| {
+            regress_on(&lattices[0], data, weights, 0, REGRESSION_RATIO).unwrap().values
+        };
+        let truth = values(&clean, &clean.weights);
+        let far = |found: &[f64]| found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let renewed = renewed_weights(&lattices, &spoilt).unwrap();
+        let (robust, plain) = (far(&values(&spoilt, &renewed)), far(&values(&spoilt, &spoilt.weights)));
+        assert!(robust < 0.01 * plain, "{robust} {plain}");
     }
 
     #[test]
