@@ -69,12 +69,22 @@ impl Default for LatticeLayout {
             shape: [64, 32, 18],
             node_density: 1.3,
             node_spread: 3.0,
-            v_density: 0.65,
-            v_max: 0.97,
+            v_density: v_density(32),
+            v_max: v_max(32),
             symmetry: Symmetry::Bilateral,
             phi_density: PHI_DENSITY,
         }
     }
+}
+
+/// The exponent along `v` of `b` nodes: the more there are, the more they crowd towards the horizon.
+fn v_density(b: usize) -> f64 {
+    0.6 + 0.3 / b as f64
+}
+
+/// The largest `v` of `b` nodes: what lies beyond is extrapolated, and grows there; few nodes are better spent elsewhere.
+fn v_max(b: usize) -> f64 {
+    1.0 - (0.18 / b as f64).clamp(0.01, 0.09)
 }
 
 /// How the nodes along `phi` grow with the number of samples: faster than the others, whose power is half of the rest.
@@ -93,13 +103,14 @@ impl LatticeLayout {
         self.len() == 0
     }
 
-    /// A lattice of this shape. Few nodes spread and crowd less: `node_spread = 1 + A / 32`, at most 3, and
-    /// `phi_density = 1 + C / 16`, at most 1.5.
+    /// A lattice of this shape. Few nodes spread and crowd less: `node_spread = 1 + A / 32`, at most 3;
+    /// `v_density = 0.6 + 0.3 / B`; `v_max = 1 - 0.18 / B`, 0.91 to 0.99; `phi_density = 1 + C / 16`, at most 1.5.
     #[must_use]
     pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
         let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
         let phi_density = (1.0 + shape[2] as f64 / 16.0).min(PHI_DENSITY);
-        Self { shape, node_spread, phi_density, symmetry, ..Self::default() }
+        let (v_density, v_max) = (v_density(shape[1]), v_max(shape[1]));
+        Self { shape, node_spread, v_density, v_max, phi_density, symmetry, ..Self::default() }
     }
 
     /// A lattice with about `samples` nodes, that of the default one in its proportions; with fewer samples the nodes

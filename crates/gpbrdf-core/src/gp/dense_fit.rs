@@ -3,14 +3,14 @@
 use crate::error::{Error, Result};
 use crate::gp::dense::{DenseEvaluator, DenseGp};
 use crate::gp::lattice_fit::{FitReport, MIN_NOISE_RATIO, Noise};
-use crate::gp::optimize::{OptimizeOptions, Parameter, maximize};
+use crate::gp::optimize::{OptimizeOptions, Optimum, Parameter, maximize};
 use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
 
 /// Fits a dense process with a sum of ARD kernels, one of each of `shapes`, to `x`, `n` rows of `metrics.len()`
 /// coordinates, and `targets`, `n` zero-mean values a channel; the channels share hyper-parameters.
 ///
 /// The search runs over variances, length scales, mixture parameters and, with [`Noise::Optimized`], the noise
-/// variance. One evaluation costs `n^3 / 2` multiply-adds, and there are some tens of them; see
+/// variance. It starts from the best of several optima on 160 of the samples. One evaluation costs `n^3 / 2` multiply-adds, and there are some tens of them; see
 /// [`dense_cost`](crate::dense_cost) for a forecast.
 ///
 /// # Errors
@@ -48,45 +48,121 @@ pub(crate) fn fit_dense_until(
     }
     shapes.iter().try_for_each(|shape| shape.validate())?;
     let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
-    let variance = (y.iter().map(|y| y * y).sum::<f64>() / y.len().max(1) as f64).max(1e-12);
-    let dimension = metrics.len();
-    let mut evaluator = DenseEvaluator::new(x, dimension, &y, channels)?;
-    let extents: Vec<f64> = (0..dimension).map(|k| extent(x, dimension, k, metrics[k])).collect();
-    let mut kernel = starting_kernel(&extents, metrics, shapes, variance);
-    let mut parameters = parameters(&kernel, &extents, n, variance);
-    if noise == Noise::Optimized {
-        parameters.push(Parameter {
-            name: "noise_variance".into(),
-            start: (1e-3 * variance).ln(),
-            lower: (MIN_NOISE_RATIO * variance).ln(),
-            upper: (10.0 * variance).ln(),
-        });
-    }
-    let count = kernel.n_parameters();
-    let noise_of = |p: &[f64]| match noise {
-        Noise::Optimized => p[count].exp(),
-        Noise::Fixed(variance) => variance,
+    let data = Data { x, y: &y, dimension: metrics.len(), channels };
+    let mut problem = Problem::new(&data, metrics, shapes, noise);
+    let mut scouting = 0;
+    // A few samples tell good valleys from bad ones for next to nothing.
+    let scouts = OptimizeOptions { restarts: options.restarts.max(SCOUT_STARTS), ..*options };
+    let found = if n <= SCOUTS || n <= metrics.len() {
+        problem.search(&data, &scouts, cancelled)?
+    } else {
+        let (x, y) = data.thinned(SCOUTS);
+        let thin = Data { x: &x, y: &y, ..data };
+        let small = Problem::new(&thin, metrics, shapes, noise);
+        let scout = small.search(&thin, &scouts, cancelled)?;
+        scouting = scout.evaluations;
+        problem.start_from(&scout.log_parameters);
+        problem.search(&data, options, cancelled)?
     };
-    let found = maximize(&parameters, y.len(), options, |p| {
-        if cancelled() {
-            return Err(Error::Cancelled);
-        }
-        kernel.set_log_parameters(&p[..count])?;
-        let mut at = evaluator.evaluate_with_gradient(&kernel, noise_of(p))?;
-        at.gradient.truncate(p.len());
-        Ok((at.log_marginal_likelihood, at.gradient))
-    })?;
-    // Its matrix makes room for the process's own.
-    drop(evaluator);
-    kernel.set_log_parameters(&found.log_parameters[..count])?;
-    let gp = DenseGp::fit_at(x, &y, channels, kernel, noise_of(&found.log_parameters))?;
+    problem.kernel.set_log_parameters(&found.log_parameters[..problem.kernel.n_parameters()])?;
+    let noise_variance = problem.noise_of(&found.log_parameters);
+    let gp = DenseGp::fit_at(x, &y, channels, problem.kernel, noise_variance)?;
     let report = FitReport {
         log_marginal_likelihood: found.value,
-        evaluations: found.evaluations,
+        evaluations: found.evaluations + scouting,
         converged: found.converged,
         at_bound: found.at_bound,
     };
     Ok((gp, report))
+}
+
+/// Samples of the first search, from several starts.
+const SCOUTS: usize = 160;
+
+/// Starts of that search besides the usual one.
+const SCOUT_STARTS: usize = 4;
+
+/// Samples: rows of coordinates, and values `[sample][channel]`.
+#[derive(Clone, Copy)]
+struct Data<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    dimension: usize,
+    channels: usize,
+}
+
+impl Data<'_> {
+    /// `count` samples spread evenly over the order: those whose index times the golden ratio has the smallest fractions.
+    fn thinned(&self, count: usize) -> (Vec<f64>, Vec<f64>) {
+        let mut order: Vec<usize> = (0..self.y.len() / self.channels).collect();
+        let fraction = |i: usize| (i as f64 * 0.618_033_988_749_894_9).fract();
+        order.sort_by(|&a, &b| fraction(a).total_cmp(&fraction(b)));
+        order.truncate(count);
+        let pick = |of: &[f64], width: usize| {
+            order.iter().flat_map(|i| of[i * width..(i + 1) * width].iter().copied()).collect()
+        };
+        (pick(self.x, self.dimension), pick(self.y, self.channels))
+    }
+}
+
+/// What is searched: a kernel's log-parameters and, where it is free, the noise variance.
+struct Problem {
+    kernel: Kernel,
+    noise: Noise,
+    parameters: Vec<Parameter>,
+}
+
+impl Problem {
+    fn new(data: &Data<'_>, metrics: &[AxisMetric], shapes: &[Shape], noise: Noise) -> Self {
+        let values = data.y.len();
+        let variance = (data.y.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64).max(1e-12);
+        let extents: Vec<f64> =
+            (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
+        let kernel = starting_kernel(&extents, metrics, shapes, variance);
+        let mut parameters = parameters(&kernel, &extents, values / data.channels, variance);
+        if noise == Noise::Optimized {
+            parameters.push(Parameter {
+                name: "noise_variance".into(),
+                start: (1e-3 * variance).ln(),
+                lower: (MIN_NOISE_RATIO * variance).ln(),
+                upper: (10.0 * variance).ln(),
+            });
+        }
+        Self { kernel, noise, parameters }
+    }
+
+    fn start_from(&mut self, log_parameters: &[f64]) {
+        for (parameter, start) in self.parameters.iter_mut().zip(log_parameters) {
+            parameter.start = start.clamp(parameter.lower, parameter.upper);
+        }
+    }
+
+    fn noise_of(&self, log_parameters: &[f64]) -> f64 {
+        match self.noise {
+            Noise::Optimized => log_parameters[self.kernel.n_parameters()].exp(),
+            Noise::Fixed(variance) => variance,
+        }
+    }
+
+    fn search(
+        &self,
+        data: &Data<'_>,
+        options: &OptimizeOptions,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<Optimum> {
+        let mut evaluator = DenseEvaluator::new(data.x, data.dimension, data.y, data.channels)?;
+        let mut kernel = self.kernel.clone();
+        let count = kernel.n_parameters();
+        maximize(&self.parameters, data.y.len(), options, |p| {
+            if cancelled() {
+                return Err(Error::Cancelled);
+            }
+            kernel.set_log_parameters(&p[..count])?;
+            let mut at = evaluator.evaluate_with_gradient(&kernel, self.noise_of(p))?;
+            at.gradient.truncate(p.len());
+            Ok((at.log_marginal_likelihood, at.gradient))
+        })
+    }
 }
 
 /// The extent of coordinate `k`, at least a small positive number.

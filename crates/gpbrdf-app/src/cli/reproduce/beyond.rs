@@ -2,83 +2,61 @@
 
 use anyhow::Result;
 use gpbrdf_core::{
-    Brdf, BrdfTable, CellMetrics, FitOptions, InducingSize, Metrics, NEURAL_FLOATS, Provenance,
-    TableFitOptions, detect_symmetry, fit_table,
+    Brdf, BrdfTable, FitOptions, InducingSize, Metrics, NEURAL_FLOATS, Provenance, TableFitOptions,
+    detect_symmetry, fit_table,
 };
 use serde_json::{Value, json};
 use std::time::Instant;
 
-use super::context::{Context, Outcome};
+use super::context::{Context, Material, Outcome};
+use super::measures::{
+    COVERAGE, LN_COS, MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, PSNR_POINT, RMS_LN, SSIM_ENV, cells, columns,
+};
 use super::plot::{Axis, Curve};
 use super::table::{Table, number};
 
 const COUNTS: [usize; 7] = [20, 40, 160, 400, 1000, 4000, 37_000];
 const QUICK_COUNTS: [usize; 4] = [20, 160, 1000, 37_000];
 
-fn metric_cells(metrics: &Metrics) -> Vec<Value> {
-    let (cells, images): (&CellMetrics, _) = (&metrics.cells, &metrics.images);
-    let coverage = cells.coverage_95.map_or(Value::Null, number);
-    let values = [
-        images.psnr_env,
-        images.psnr_point,
-        images.ssim_env,
-        cells.median_abs_log,
-        cells.log_rmse,
-        cells.log1p_cos_l1,
-        cells.mae,
-        cells.mse,
-    ];
-    values.into_iter().map(number).chain([coverage]).collect()
-}
-
-const METRICS: [&str; 9] = [
-    "PSNR env",
-    "PSNR point",
-    "SSIM env",
-    "median ln",
-    "rms ln",
-    "ln(1 + f cos)",
-    "MAE",
-    "MSE",
-    "coverage 95 %",
-];
+const MEASURES: [Measure; 9] =
+    [PSNR_ENV, PSNR_POINT, SSIM_ENV, MEDIAN_LN, RMS_LN, LN_COS, MAE, MSE, COVERAGE];
 
 pub(super) fn run(context: &Context) -> Result<Outcome> {
-    let columns = |first: &[&'static str]| [first, &METRICS[..]].concat();
     let mut rivals = Table::new(
         "beyond-rivals",
         "Whole table known: stored floats",
-        &columns(&["material", "truth", "model", "floats", "fit s"]),
+        &columns(&["material", "truth", "model", "floats", "fit s"], &MEASURES, &[]),
     );
     let mut curve = Table::new(
         "beyond-samples",
         "Few measurements: sampling curve and calibration of the 95 % interval",
-        &columns(&["material", "truth", "samples", "floats", "fit s"]),
+        &columns(&["material", "truth", "samples", "floats", "fit s"], &MEASURES, &[]),
     );
     let counts = if context.quick { &QUICK_COUNTS[..] } else { &COUNTS[..] };
     let (mut quality, mut coverage) = (Vec::new(), Vec::new());
-    for (name, origin, truth) in context.all_materials()? {
-        against_neural(context, &name, &origin, &truth, &mut rivals)?;
+    for material in context.all_materials()? {
+        let truth = material.truth()?;
+        against_neural(context, material, &truth, &mut rivals)?;
         let mut points: [Vec<(f64, f64)>; 2] = [Vec::new(), Vec::new()];
         for &count in counts {
-            let samples = Context::lattice_samples(&truth, count)?;
+            let samples = material.lattice_samples(count)?;
             let fitted = context.fit_and_compare(&truth, &samples, &FitOptions::default(), true)?;
             let n = samples.angles.len();
             points[0].push((n as f64, fitted.metrics.images.psnr_env));
             points[1].extend(fitted.metrics.cells.coverage_95.map(|share| (n as f64, share)));
             let mut row = vec![
-                json!(name),
-                json!(origin),
+                json!(material.name()),
+                json!(material.origin),
                 json!(n),
                 json!(fitted.model.floats()),
                 number(fitted.fit_seconds),
             ];
-            row.extend(metric_cells(&fitted.metrics));
+            row.extend(cells(&MEASURES, &fitted.metrics));
             curve.rows.push(row);
         }
         let [psnr, share] = points;
-        quality.push(Curve { name: name.clone(), points: psnr });
-        coverage.push(Curve { name, points: share });
+        quality.push(Curve { name: material.name().to_owned(), points: psnr });
+        coverage.push(Curve { name: material.name().to_owned(), points: share });
     }
     rivals.add_means(2);
     curve.add_means(2);
@@ -102,17 +80,17 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
 /// Rows for Neural BRDF, where there is a fit of this material, and for inducing lattices of as many floats.
 fn against_neural(
     context: &Context,
-    name: &str,
-    origin: &str,
+    material: Material<'_>,
     truth: &BrdfTable,
     table: &mut Table,
 ) -> Result<()> {
     let mut add = |model: &str, floats: usize, seconds: Value, metrics: &Metrics| {
-        let mut row = vec![json!(name), json!(origin), json!(model), json!(floats), seconds];
-        row.extend(metric_cells(metrics));
+        let (name, origin) = (json!(material.name()), json!(material.origin));
+        let mut row = vec![name, origin, json!(model), json!(floats), seconds];
+        row.extend(cells(&MEASURES, metrics));
         table.rows.push(row);
     };
-    if let Some((_, neural)) = context.neural.iter().find(|(of, _)| of == name) {
+    if let Some((_, neural)) = context.neural.iter().find(|(of, _)| of == material.name()) {
         let predicted = BrdfTable::from_fn(|angles| neural.eval_half_diff(angles));
         let metrics = Metrics::new(truth, &predicted, &context.environment, None)?;
         add("Neural BRDF", NEURAL_FLOATS, Value::Null, &metrics);

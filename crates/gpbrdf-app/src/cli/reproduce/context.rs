@@ -1,5 +1,6 @@
 //! What all experiments share: options, materials, and the comparison of a model with its truth.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -67,11 +68,49 @@ pub(super) struct Context {
     /// Seconds for one dense fit.
     pub(super) budget: f64,
     pub(super) environment: Environment,
+    /// Stand-ins for the paper's materials, [`PAPER_MATERIALS`].
+    pub(super) built_in: Vec<Source>,
     /// The measurements found with `--data`.
     pub(super) measured: Vec<Source>,
     /// Restriction to these materials, where there is one.
     pub(super) only: Vec<String>,
     pub(super) neural: Vec<(String, NeuralBrdf)>,
+}
+
+/// A material of an experiment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Material<'a> {
+    source: &'a Source,
+    /// What kind of truth it is, for people.
+    pub(super) origin: &'a str,
+}
+
+impl<'a> Material<'a> {
+    pub(super) fn name(&self) -> &'a str {
+        &self.source.name
+    }
+
+    /// The table that predictions are compared with.
+    ///
+    /// # Errors
+    /// A source of scattered samples.
+    pub(super) fn truth(&self) -> Result<Cow<'a, BrdfTable>> {
+        self.source.table().with_context(|| self.shapeless())
+    }
+
+    /// Asks the source itself on the default lattice of about `count` nodes.
+    ///
+    /// # Errors
+    /// A source of scattered samples, or a count out of range.
+    pub(super) fn lattice_samples(&self, count: usize) -> Result<SampleSet> {
+        let brdf = self.source.brdf().with_context(|| self.shapeless())?;
+        let lattice = LatticeLayout::with_samples(count, detect_symmetry(brdf))?;
+        Ok(SampleSet::measure(brdf, &Layout::Lattice(lattice))?)
+    }
+
+    fn shapeless(&self) -> String {
+        format!("{}: expected a table or a BRDF that can be asked anywhere, found samples", self.name())
+    }
 }
 
 /// A fitted model, its table and how it compares.
@@ -89,22 +128,20 @@ impl Context {
     }
 
     /// The paper's materials: the user's MERL files where there are some, else reconstructions.
-    pub(super) fn paper_materials(&self) -> Result<Vec<(String, String, BrdfTable)>> {
-        let mut found = Vec::new();
-        for name in PAPER_MATERIALS.into_iter().filter(|name| self.wanted(name)) {
-            let file = self.measured.iter().find(|s| s.name == name && s.kind.contains("MERL"));
-            let built_in;
-            let source = match file {
-                Some(source) => source,
-                None => {
-                    built_in = Source::built_in(name)?;
-                    &built_in
-                }
-            };
-            let origin = if file.is_some() { "MERL" } else { "reconstructed from a published fit" };
-            found
-                .extend(source.table().map(|table| (name.to_owned(), origin.to_owned(), table.into_owned())));
-        }
+    ///
+    /// # Errors
+    /// `--materials` that names none of them.
+    pub(super) fn paper_materials(&self) -> Result<Vec<Material<'_>>> {
+        let of = |built_in: &'_ Source| {
+            self.measured.iter().find(|s| s.name == built_in.name && s.kind.contains("MERL"))
+        };
+        let wanted = self.built_in.iter().filter(|source| self.wanted(&source.name));
+        let found: Vec<Material<'_>> = wanted
+            .map(|built_in| match of(built_in) {
+                Some(source) => Material { source, origin: "MERL" },
+                None => Material { source: built_in, origin: "reconstructed from a published fit" },
+            })
+            .collect();
         if found.is_empty() {
             bail!(
                 "--materials: expected at least one of {}, found {}",
@@ -116,18 +153,21 @@ impl Context {
     }
 
     /// The measurements of `--data`, or the paper's materials without any.
-    pub(super) fn all_materials(&self) -> Result<Vec<(String, String, BrdfTable)>> {
+    ///
+    /// # Errors
+    /// `--materials` that names none of them.
+    pub(super) fn all_materials(&self) -> Result<Vec<Material<'_>>> {
         let measured = self.measured.iter().filter(|source| self.wanted(&source.name));
-        let tables = measured.filter_map(|s| Some((s.name.clone(), s.kind.clone(), s.table()?.into_owned())));
-        let tables: Vec<_> = if self.quick { tables.take(3).collect() } else { tables.collect() };
-        if !tables.is_empty() {
-            return Ok(tables);
+        let mut found: Vec<_> = measured.map(|source| Material { source, origin: &source.kind }).collect();
+        if found.is_empty() {
+            found = self.paper_materials()?;
+            if self.quick {
+                found.truncate(2);
+            }
+        } else if self.quick {
+            found.truncate(3);
         }
-        let mut tables = self.paper_materials()?;
-        if self.quick {
-            tables.truncate(2);
-        }
-        Ok(tables)
+        Ok(found)
     }
 
     /// The largest number of samples whose dense fit with `terms` kernels keeps to the budget of time.
@@ -142,12 +182,6 @@ impl Context {
             if fits(middle) { low = middle } else { high = middle }
         }
         low
-    }
-
-    /// Samples a table on the default lattice of about `count` nodes.
-    pub(super) fn lattice_samples(truth: &BrdfTable, count: usize) -> Result<SampleSet> {
-        let lattice = LatticeLayout::with_samples(count, detect_symmetry(truth))?;
-        Ok(SampleSet::measure(truth, &Layout::Lattice(lattice))?)
     }
 
     /// Fits a model to samples, bakes it and compares it with the truth; `interval` bakes sigma for the coverage.

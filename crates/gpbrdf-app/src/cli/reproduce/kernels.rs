@@ -2,10 +2,11 @@
 
 use anyhow::Result;
 use gpbrdf_core::{FitOptions, Shape};
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::context::{Context, Fitted, Outcome};
+use super::context::{Context, Outcome};
 use super::materials::PAPER_SAMPLES;
+use super::measures::{MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, cells, columns};
 use super::paper_lattice::{paper_options, paper_samples};
 use super::table::{Table, number};
 
@@ -23,46 +24,38 @@ const KERNELS: [(&str, &[Shape], [f64; 3]); 6] = [
     ("RQ+SE", &[RQ, SE], [0.0205, 0.1078, 52.9558]),
 ];
 
+const MEASURES: [Measure; 4] = [MAE, MSE, PSNR_ENV, MEDIAN_LN];
+
 pub(super) fn run(context: &Context) -> Result<Outcome> {
     let materials = context.paper_materials()?;
-    let Some((name, origin, truth)) = materials.first() else { return Ok(Outcome::default()) };
+    let Some(material) = materials.first() else { return Ok(Outcome::default()) };
+    let truth = material.truth()?;
     let mut table = Table::new(
         "table3",
-        format!("Table 3: kernels, {name} ({origin})"),
-        &[
-            "kernel",
-            "setting",
-            "samples",
-            "MAE",
-            "MSE",
-            "PSNR env",
-            "median ln",
-            "fit s",
-            "paper MAE",
-            "paper MSE",
-            "paper PSNR",
-        ],
+        format!("Table 3: kernels, {} ({})", material.name(), material.origin),
+        &columns(
+            &["kernel", "setting", "samples"],
+            &MEASURES,
+            &["fit s", "paper MAE", "paper MSE", "paper PSNR"],
+        ),
     );
     // Sums search over twice the parameters; all are given as many samples as a sum can have.
     let most = context.dense_samples(2);
-    let few = paper_samples(truth, most);
-    let many = Context::lattice_samples(truth, PAPER_SAMPLES)?;
-    let row = |kernel: &str, setting: &str, samples: usize, fitted: &Fitted, paper: [f64; 3]| -> Vec<Value> {
-        let cells = &fitted.metrics.cells;
-        let mut row =
-            vec![json!(kernel), json!(setting), json!(samples), number(cells.mae), number(cells.mse)];
-        let rest = [fitted.metrics.images.psnr_env, cells.median_abs_log, fitted.fit_seconds];
-        row.extend(rest.into_iter().chain(paper).map(number));
-        row
-    };
-    for (kernel, shapes, paper) in KERNELS {
-        let fitted = context.fit_and_compare(truth, &few, &paper_options(shapes.to_vec()), false)?;
-        table.rows.push(row(kernel, "dense", few.angles.len(), &fitted, paper));
-    }
-    for (kernel, shapes, paper) in KERNELS {
-        let options = FitOptions { kernel: shapes.to_vec(), ..FitOptions::default() };
-        let fitted = context.fit_and_compare(truth, &many, &options, false)?;
-        table.rows.push(row(kernel, "lattice", many.angles.len(), &fitted, paper));
+    let few = paper_samples(&truth, most);
+    let many = material.lattice_samples(PAPER_SAMPLES)?;
+    for (setting, samples) in [("dense", few), ("lattice", many)] {
+        for (kernel, shapes, paper) in KERNELS {
+            let kernels = shapes.to_vec();
+            let options = match samples.lattice {
+                None => paper_options(kernels),
+                Some(_) => FitOptions { kernel: kernels, ..FitOptions::default() },
+            };
+            let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
+            let mut row = vec![json!(kernel), json!(setting), json!(samples.angles.len())];
+            row.extend(cells(&MEASURES, &fitted.metrics));
+            row.extend([fitted.fit_seconds].into_iter().chain(paper).map(number));
+            table.rows.push(row);
+        }
     }
     table.note(format!(
         "Dense: the paper's setting with ARD kernels on {most} of its cells, what a budget of {} s is expected to hold for a sum. \

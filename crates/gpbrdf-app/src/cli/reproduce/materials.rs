@@ -1,10 +1,13 @@
 //! Table 2: the paper's six materials and cherry-235, in its setting and in ours.
 
 use anyhow::Result;
-use gpbrdf_core::{FitOptions, Metrics, Shape};
+use gpbrdf_core::{FitOptions, Shape};
 use serde_json::{Value, json};
 
 use super::context::{Context, Outcome};
+use super::measures::{
+    MAE, MEDIAN_LN, MSE, Measure, PAPER_PSNR, PSNR_ENV, PSNR_POINT, SSIM_ENV, cells, columns,
+};
 use super::paper_lattice::{paper_cells, paper_options, paper_samples};
 use super::table::{Table, number};
 
@@ -21,67 +24,35 @@ const PAPER: [(&str, [f64; 3]); 6] = [
 /// The paper's number of samples.
 pub(super) const PAPER_SAMPLES: usize = 37_616;
 
-const COLUMNS: [&str; 12] = [
-    "material",
-    "truth",
-    "setting",
-    "samples",
-    "MAE",
-    "MSE",
-    "paper's PSNR",
-    "PSNR env",
-    "PSNR point",
-    "SSIM env",
-    "median ln",
-    "fit s",
-];
-
-fn row(
-    name: &str,
-    origin: &str,
-    setting: &str,
-    samples: usize,
-    metrics: &Metrics,
-    seconds: f64,
-) -> Vec<Value> {
-    let (cells, images) = (&metrics.cells, &metrics.images);
-    vec![
-        json!(name),
-        json!(origin),
-        json!(setting),
-        json!(samples),
-        number(cells.mae),
-        number(cells.mse),
-        number(cells.psnr_paper_table2),
-        number(images.psnr_env),
-        number(images.psnr_point),
-        number(images.ssim_env),
-        number(cells.median_abs_log),
-        number(seconds),
-    ]
-}
+const MEASURES: [Measure; 7] = [MAE, MSE, PAPER_PSNR, PSNR_ENV, PSNR_POINT, SSIM_ENV, MEDIAN_LN];
 
 pub(super) fn run(context: &Context) -> Result<Outcome> {
-    let mut table = Table::new("table2", "Table 2: the paper's materials", &COLUMNS);
+    let columns = columns(&["material", "truth", "setting", "samples"], &MEASURES, &["fit s"]);
+    let mut table = Table::new("table2", "Table 2: the paper's materials", &columns);
     let most = context.dense_samples(1);
-    for (name, origin, truth) in context.paper_materials()? {
+    for material in context.paper_materials()? {
+        let name = material.name();
         if let Some((_, [mae, mse, psnr])) = PAPER.iter().find(|(of, _)| *of == name) {
             let mut row =
                 vec![json!(name), json!("MERL"), json!("printed in the paper"), json!(PAPER_SAMPLES)];
             row.extend([number(*mae), number(*mse), number(*psnr)]);
-            row.resize(COLUMNS.len(), Value::Null);
+            row.resize(columns.len(), Value::Null);
             table.rows.push(row);
         }
-        let samples = paper_samples(&truth, most);
-        let options = paper_options(vec![Shape::RationalQuadratic { alpha: 1.0 }]);
-        let theirs = context.fit_and_compare(&truth, &samples, &options, false)?;
-        let count = samples.angles.len();
-        let setting = "the paper's, thinned";
-        table.rows.push(row(&name, &origin, setting, count, &theirs.metrics, theirs.fit_seconds));
-        let samples = Context::lattice_samples(&truth, PAPER_SAMPLES)?;
-        let ours = context.fit_and_compare(&truth, &samples, &FitOptions::default(), false)?;
-        let count = samples.angles.len();
-        table.rows.push(row(&name, &origin, "ours", count, &ours.metrics, ours.fit_seconds));
+        let truth = material.truth()?;
+        let theirs = paper_options(vec![Shape::RationalQuadratic { alpha: 1.0 }]);
+        let settings = [
+            ("the paper's, thinned", paper_samples(&truth, most), theirs),
+            ("ours", material.lattice_samples(PAPER_SAMPLES)?, FitOptions::default()),
+        ];
+        for (setting, samples, options) in settings {
+            let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
+            let mut row =
+                vec![json!(name), json!(material.origin), json!(setting), json!(samples.angles.len())];
+            row.extend(cells(&MEASURES, &fitted.metrics));
+            row.push(number(fitted.fit_seconds));
+            table.rows.push(row);
+        }
     }
     table.note(format!(
         "The paper's setting: identity transform, zero mean, ARD rational quadratic on plain angles, dense, on its lattice of every \

@@ -5,6 +5,7 @@ mod context;
 mod hemisphere;
 mod kernels;
 mod materials;
+mod measures;
 mod paper_lattice;
 mod pictures;
 mod plot;
@@ -17,7 +18,7 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use gpbrdf_core::{materials as built_in_materials, read_neural_csv, sha256_file};
+use gpbrdf_core::{Source, materials as built_in_materials, read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
 use super::input::{OutputFolder, environment};
@@ -158,6 +159,7 @@ impl Reproduce {
             environment: environment(self.env.as_deref())?,
             only: self.materials.clone(),
             neural: self.nbrdf.as_deref().map_or(Ok(Vec::new()), read_neural_csv)?,
+            built_in: context::PAPER_MATERIALS.into_iter().map(Source::built_in).collect::<Result<_, _>>()?,
             measured,
         };
         let key = self.key(&context)?;

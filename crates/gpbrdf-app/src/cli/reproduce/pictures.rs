@@ -32,11 +32,12 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
     );
     let size = if context.quick { 96 } else { 256 };
     let mut distributions = Vec::new();
-    for (name, origin, truth) in context.paper_materials()? {
-        let samples = Context::lattice_samples(&truth, PAPER_SAMPLES)?;
+    for material in context.paper_materials()? {
+        let (name, truth) = (material.name(), material.truth()?);
+        let samples = material.lattice_samples(PAPER_SAMPLES)?;
         let fitted = context.fit_and_compare(&truth, &samples, &FitOptions::default(), false)?;
-        let tables = [&truth, &fitted.mean];
-        let slice = slice_figure(&name, Some(&truth), &fitted.mean, None, &SliceOptions::default())?;
+        let tables = [&*truth, &fitted.mean];
+        let slice = slice_figure(name, Some(&*truth), &fitted.mean, None, &SliceOptions::default())?;
         outcome.picture(format!("figure4-slice-{name}.png"), &slice)?;
         let lights = [
             ("environment", render_env(&tables, &context.environment, size)),
@@ -49,7 +50,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             let found = PixelDifference::new(a, b)?;
             table.rows.push(vec![
                 json!(name),
-                json!(origin),
+                json!(material.origin),
                 json!(light),
                 number(found.mean),
                 number(found.median),
@@ -64,7 +65,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
                     let share = i as f64 / STEPS as f64;
                     values.get(i * last / STEPS).map(|&x| (x.max(1e-7), share))
                 });
-                distributions.push(Curve { name: name.clone(), points: points.collect() });
+                distributions.push(Curve { name: name.to_owned(), points: points.collect() });
             }
         }
     }

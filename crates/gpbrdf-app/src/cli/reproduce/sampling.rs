@@ -5,12 +5,15 @@ use gpbrdf_core::{FitOptions, Layout, N_CELLS, SampleSet, Solver};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
+use super::measures::{MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, cells, columns};
 use super::plot::{Axis, Curve};
 use super::table::{Table, number};
 
 /// Percent of the cells of a table.
 const RATES: [f64; 9] = [0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 2.58, 5.0, 10.0];
 const QUICK_RATES: [f64; 4] = [0.05, 0.2, 1.0, 2.58];
+
+const MEASURES: [Measure; 4] = [MAE, MSE, MEDIAN_LN, PSNR_ENV];
 
 /// Of all cells of a table, `rate` percent.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rates are in 0 to 10")]
@@ -20,11 +23,16 @@ fn samples_of(rate: f64) -> usize {
 
 pub(super) fn run(context: &Context) -> Result<Outcome> {
     let materials = context.paper_materials()?;
-    let Some((name, origin, truth)) = materials.last() else { return Ok(Outcome::default()) };
+    let Some(material) = materials.last() else { return Ok(Outcome::default()) };
+    let truth = material.truth()?;
     let mut table = Table::new(
         "figure2",
-        format!("Figure 2: error and time against the sampling rate, {name} ({origin})"),
-        &["solver", "rate %", "samples", "MAE", "MSE", "median ln", "PSNR env", "fit s"],
+        format!(
+            "Figure 2: error and time against the sampling rate, {} ({})",
+            material.name(),
+            material.origin
+        ),
+        &columns(&["solver", "rate %", "samples"], &MEASURES, &["fit s"]),
     );
     let names = ["lattice", "dense, random cells"];
     let mut errors = names.map(|name| Curve { name: name.into(), points: Vec::new() });
@@ -39,26 +47,20 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
         for count in wanted {
             let (samples, options) = if k == 0 {
-                (Context::lattice_samples(truth, count)?, FitOptions::default())
+                (material.lattice_samples(count)?, FitOptions::default())
             } else {
-                let samples = SampleSet::measure(truth, &Layout::Cells { count, seed: 0 })?;
+                let samples = SampleSet::measure(&*truth, &Layout::Cells { count, seed: 0 })?;
                 (samples, FitOptions { solver: Solver::Dense, ..FitOptions::default() })
             };
-            let fitted = context.fit_and_compare(truth, &samples, &options, false)?;
-            let (cells, n) = (&fitted.metrics.cells, samples.angles.len());
+            let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
+            let n = samples.angles.len();
             let rate = 100.0 * n as f64 / N_CELLS as f64;
-            errors[k].points.push((rate, cells.mae));
+            errors[k].points.push((rate, fitted.metrics.cells.mae));
             times[k].points.push((rate, fitted.fit_seconds));
-            table.rows.push(vec![
-                json!(name),
-                number(rate),
-                json!(n),
-                number(cells.mae),
-                number(cells.mse),
-                number(cells.median_abs_log),
-                number(fitted.metrics.images.psnr_env),
-                number(fitted.fit_seconds),
-            ]);
+            let mut row = vec![json!(name), number(rate), json!(n)];
+            row.extend(cells(&MEASURES, &fitted.metrics));
+            row.push(number(fitted.fit_seconds));
+            table.rows.push(row);
         }
     }
     table.note(format!(
