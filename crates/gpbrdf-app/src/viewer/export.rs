@@ -118,13 +118,16 @@ pub(crate) fn model(viewer: &mut Viewer, path: &Path) {
     });
 }
 
-/// A picture of the window, as PNG and EXR in the current folder.
-pub(crate) fn screenshot(ctx: &Context, outbox: &Outbox) {
-    let outbox = outbox.clone();
+/// A picture of the window, as PNG and EXR in the folder of screenshots.
+pub(crate) fn screenshot(ctx: &Context, viewer: &Viewer) {
+    let (outbox, folder) = (viewer.outbox.clone(), viewer.pictures.clone());
     ctx.request_screenshot(move |image| {
+        let folder = folder.clone();
         in_background(&outbox, move || {
             let [width, height] = image.size;
-            let path = free_name("gpbrdf-screenshot")?;
+            let folder =
+                folder.map_or_else(std::env::current_dir, Ok).context("cannot find the current folder")?;
+            let path = free_name(&folder, "gpbrdf-screenshot")?;
             let picture = Picture::from_fn(width, height, |x, y| {
                 let [r, g, b, _] = image.pixels[y * width + x].to_array();
                 [r, g, b]
@@ -144,9 +147,9 @@ pub(crate) fn screenshot(ctx: &Context, outbox: &Outbox) {
     });
 }
 
-/// A name in the current folder that no file has.
-fn free_name(stem: &str) -> Result<PathBuf> {
-    let folder = std::env::current_dir().context("cannot find the current folder")?;
-    let names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
-    names.into_iter().find(|p| !p.exists()).context("too many screenshots in this folder")
+/// A name in a folder that no file has.
+fn free_name(folder: &Path, stem: &str) -> Result<PathBuf> {
+    let mut names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
+    let free = names.find(|p| !p.exists() && !p.with_extension("exr").exists());
+    free.with_context(|| format!("too many screenshots in \"{}\"", folder.display()))
 }

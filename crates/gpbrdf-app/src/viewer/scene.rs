@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use eframe::egui::TextureId;
 use eframe::egui_wgpu::RenderState;
-use eframe::wgpu::FilterMode;
+use eframe::wgpu::{FilterMode, TextureView};
 use glam::Vec3;
-use gpbrdf_core::{BrdfTable, Environment, SigmaTable, psnr, ssim};
+use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
     Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light, Mesh, Precision,
     Renderer, Show, read_obj,
@@ -17,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::document::DocumentId;
 use super::fitter::{Event, Outbox};
 use super::mailbox::{Mailbox, Sender};
+use super::quality::{Measured, Measurer};
 use super::settings::SphereShown;
 use super::spheres::SphereLight;
 use super::widgets::narrow;
@@ -90,9 +92,29 @@ pub(crate) struct SceneKey {
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
     pub(crate) exposure: f32,
+    /// Of one picture, of which there are two side by side.
     pub(crate) size: [u32; 2],
     pub(crate) shown: SphereShown,
     pub(crate) swipe: f32,
+}
+
+impl SceneKey {
+    /// Whether truth and prediction are two whole pictures.
+    fn is_pair(&self) -> bool {
+        self.has_truth && self.shown == SphereShown::SideBySide
+    }
+
+    /// What is shown, on each of two pictures where there are two.
+    fn show(&self) -> [Show; 2] {
+        let first = match self.shown {
+            SphereShown::Difference if self.has_truth => Show::Difference,
+            SphereShown::Sigma => Show::Sigma,
+            SphereShown::Swipe if self.has_truth => Show::Split { at: self.swipe },
+            SphereShown::SideBySide if self.has_truth => Show::Truth,
+            _ => Show::Prediction,
+        };
+        [first, Show::Prediction]
+    }
 }
 
 /// A picture to make.
@@ -109,10 +131,12 @@ pub(crate) struct SceneRequest {
 #[derive(Clone, Debug)]
 pub(crate) struct SceneImage {
     pub(crate) document: DocumentId,
+    /// Tells this picture, however smooth it gets, from all others.
+    pub(crate) picture: u64,
     pub(crate) texture: TextureId,
+    /// The prediction, where `texture` is the truth alone.
+    pub(crate) beside: Option<TextureId>,
     pub(crate) samples: u32,
-    /// Between truth and prediction, once the picture is smooth.
-    pub(crate) quality: Option<(f64, f64)>,
 }
 
 /// Samples of a smooth picture.
@@ -120,11 +144,22 @@ const SAMPLES: u32 = 192;
 /// End of the scales of false colours.
 pub(crate) const LIMIT: f32 = 0.1;
 
-/// Starts the thread that renders.
-pub(crate) fn spawn(outbox: Outbox, state: RenderState) -> std::io::Result<Sender<SceneRequest>> {
-    let mut scene = Scene { state, renderer: None, texture: None, materials: None, last: None };
+/// Starts the thread that renders; beyond the first samples it lets the fitter go first.
+pub(crate) fn spawn(
+    outbox: Outbox,
+    state: RenderState,
+    busy: impl Fn() -> bool + Send + 'static,
+) -> std::io::Result<Sender<SceneRequest>> {
+    let mut scene = Scene {
+        textures: Textures { state, shown: [None, None] },
+        renderer: None,
+        materials: None,
+        last: None,
+        picture: 0,
+        measurer: Measurer::spawn(outbox.clone())?,
+    };
     Mailbox::spawn("scene", move |request: SceneRequest, stale| {
-        if let Err(message) = scene.render(&request, &outbox, stale) {
+        if let Err(message) = scene.render(&request, &outbox, stale, &busy) {
             (scene.renderer, scene.materials, scene.last) = (None, None, None);
             outbox.send(Event::SceneFailed(message));
         }
@@ -132,17 +167,46 @@ pub(crate) fn spawn(outbox: Outbox, state: RenderState) -> std::io::Result<Sende
 }
 
 struct Scene {
-    state: RenderState,
+    textures: Textures,
     renderer: Option<(Context, Renderer)>,
-    texture: Option<(TextureId, [u32; 2])>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
+    picture: u64,
+    measurer: Measurer,
 }
 
-/// Textures, with what they were made from.
+/// BRDFs on the device, with what they were made from.
 struct Materials {
     truth: Option<(DocumentId, BrdfTexture)>,
     prediction: (u64, bool, BrdfTexture),
+}
+
+/// Pictures as the window knows them.
+struct Textures {
+    state: RenderState,
+    shown: [Option<(TextureId, TextureView)>; 2],
+}
+
+impl Textures {
+    /// The name of a picture.
+    fn id(&mut self, slot: usize, view: &TextureView) -> TextureId {
+        let device = &self.state.device;
+        let id = match &self.shown[slot] {
+            Some((id, known)) if known == view => return *id,
+            Some((id, _)) => {
+                let mut renderer = self.state.renderer.write();
+                renderer.update_egui_texture_from_wgpu_texture(device, view, FilterMode::Linear, *id);
+                *id
+            }
+            None => self.state.renderer.write().register_native_texture(device, view, FilterMode::Linear),
+        };
+        self.shown[slot] = Some((id, view.clone()));
+        id
+    }
+}
+
+fn say(error: gpbrdf_render::Error) -> String {
+    error.to_string()
 }
 
 impl Scene {
@@ -151,17 +215,59 @@ impl Scene {
         request: &SceneRequest,
         outbox: &Outbox,
         stale: &(dyn Fn() -> bool + Sync),
+        busy: &dyn Fn() -> bool,
     ) -> Result<(), String> {
-        let say = |error: gpbrdf_render::Error| error.to_string();
+        let key = &request.key;
+        self.prepare(request)?;
+        let Some((_, renderer)) = &mut self.renderer else { return Ok(()) };
+        let display = Display {
+            exposure: key.exposure.max(1e-6),
+            background: if key.light.point { Background::Black } else { Background::Environment },
+            limit: LIMIT,
+            ..Display::default()
+        };
+        let displays = key.show().map(|show| Display { show, ..display });
+        let mut step = 1;
+        loop {
+            if renderer.samples() < SAMPLES {
+                renderer.render_more(step).map_err(say)?;
+            }
+            let (texture, beside) = if key.is_pair() {
+                let [truth, prediction] = renderer.display_pair(&displays).map_err(say)?;
+                (self.textures.id(0, truth), Some(self.textures.id(1, prediction)))
+            } else {
+                (self.textures.id(0, renderer.display(&displays[0]).map_err(say)?), None)
+            };
+            renderer.wait().map_err(say)?;
+            let (document, picture, samples) = (key.document, self.picture, renderer.samples());
+            outbox.send(Event::Scene(SceneImage { document, picture, texture, beside, samples }));
+            let last = samples >= SAMPLES;
+            if key.has_truth && self.measurer.wants(picture, samples, last) {
+                let linear = renderer.read_linear().map_err(say)?;
+                let exposure = f64::from(display.exposure);
+                self.measurer.put(Measured { document, picture, samples, exposure, linear });
+            }
+            while !last && busy() && !stale() {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            if last || stale() {
+                return Ok(());
+            }
+            step = (step * 2).min(8);
+        }
+    }
+
+    /// Hands the renderer what has changed.
+    fn prepare(&mut self, request: &SceneRequest) -> Result<(), String> {
         let key = &request.key;
         if self.renderer.is_none() {
-            let state = &self.state;
+            let state = &self.textures.state;
             let context = Context::from_device(&state.adapter, state.device.clone(), state.queue.clone());
             let renderer = Renderer::new(&context, key.size).map_err(say)?;
             self.renderer = Some((context, renderer));
         }
         self.set_materials(request)?;
-        let Some((context, renderer)) = &mut self.renderer else { return Ok(()) };
+        let Some((_, renderer)) = &mut self.renderer else { return Ok(()) };
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
         if changed(&|l| l.shape == key.shape) {
@@ -175,61 +281,16 @@ impl Scene {
             let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
             renderer.set_camera(camera.zoomed(orbit.zoom)).map_err(say)?;
         }
-        if changed(&|l| l.light == key.light && l.environment == key.environment && l.orbit == key.orbit)
-            && (key.light.point || changed(&|l| l.light == key.light && l.environment == key.environment))
-        {
+        // A point light turns with the eye.
+        let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
+        if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
             renderer.set_light(light(key, &request.environment)).map_err(say)?;
         }
-        let show = match key.shown {
-            SphereShown::Difference if key.has_truth => Show::Difference,
-            SphereShown::Sigma => Show::Sigma,
-            SphereShown::Swipe | SphereShown::SideBySide if key.has_truth => Show::Split { at: key.swipe },
-            _ => Show::Prediction,
-        };
-        let display = Display {
-            show,
-            exposure: key.exposure.max(1e-6),
-            background: if key.light.point { Background::Black } else { Background::Environment },
-            limit: LIMIT,
-            ..Display::default()
-        };
-        self.last = Some(key.clone());
-        let mut quality = None;
-        let mut step = 1;
-        loop {
-            renderer.render_more(step).map_err(say)?;
-            let view = renderer.display(&display).map_err(say)?.clone();
-            let device = context.device();
-            let texture = match self.texture {
-                Some((texture, size)) if size == key.size => texture,
-                old => {
-                    let mut egui = self.state.renderer.write();
-                    let texture = match old {
-                        Some((id, _)) => {
-                            egui.update_egui_texture_from_wgpu_texture(device, &view, FilterMode::Linear, id);
-                            id
-                        }
-                        None => egui.register_native_texture(device, &view, FilterMode::Linear),
-                    };
-                    self.texture = Some((texture, key.size));
-                    texture
-                }
-            };
-            renderer.wait().map_err(say)?;
-            let samples = renderer.samples();
-            if samples >= SAMPLES && key.has_truth && !stale() {
-                let pictures = renderer.read_linear().and_then(|linear| linear.images()).map_err(say)?;
-                let exposure = f64::from(key.exposure);
-                let found =
-                    (psnr(&pictures.0, &pictures.1, exposure), ssim(&pictures.0, &pictures.1, exposure));
-                quality = found.0.ok().zip(found.1.ok());
-            }
-            outbox.send(Event::Scene(SceneImage { document: key.document, texture, samples, quality }));
-            if stale() || samples >= SAMPLES {
-                return Ok(());
-            }
-            step = (step * 2).min(8);
+        if renderer.samples() == 0 || changed(&|l| l.exposure == key.exposure) {
+            self.picture += 1;
         }
+        self.last = Some(key.clone());
+        Ok(())
     }
 
     fn set_materials(&mut self, request: &SceneRequest) -> Result<(), String> {
@@ -243,7 +304,6 @@ impl Scene {
         if same {
             return Ok(());
         }
-        let say = |error: gpbrdf_render::Error| error.to_string();
         let precision = Precision::Half;
         let truth = match (&request.truth, self.materials.take()) {
             (None, _) => None,
