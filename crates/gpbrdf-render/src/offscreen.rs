@@ -64,8 +64,6 @@ struct Frame {
     gbuffer: GBuffer,
     sums: wgpu::Buffer,
     display: DisplayTexture,
-    /// The second of two pictures that are shown at once.
-    beside: Option<DisplayTexture>,
 }
 
 impl Frame {
@@ -74,7 +72,7 @@ impl Frame {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let bytes = 32 * u64::from(size[0]) * u64::from(size[1]);
         let sums = context.empty_buffer("running sums of the picture", bytes, usage)?;
-        Ok(Self { gbuffer, sums, display: DisplayTexture::new(context, size)?, beside: None })
+        Ok(Self { gbuffer, sums, display: DisplayTexture::new(context, size)? })
     }
 }
 
@@ -325,26 +323,6 @@ impl Renderer {
     /// # Errors
     /// [`crate::Error::InvalidArgument`] unless exposure and limit are positive, and those of [`Context::guard`].
     pub fn display(&mut self, display: &Display) -> Result<&wgpu::TextureView> {
-        self.draw(display, &self.frame.display)?;
-        Ok(&self.frame.display.view)
-    }
-
-    /// Draws two pictures of the same samples, each whole, on two textures: the one of [`Renderer::display`] is the first.
-    ///
-    /// # Errors
-    /// Those of [`Renderer::display`].
-    pub fn display_pair(&mut self, displays: &[Display; 2]) -> Result<[&wgpu::TextureView; 2]> {
-        if self.frame.beside.is_none() {
-            self.frame.beside = Some(DisplayTexture::new(&self.context, self.size())?);
-        }
-        let first = &self.frame.display;
-        let second = self.frame.beside.as_ref().unwrap_or(first);
-        self.draw(&displays[0], first)?;
-        self.draw(&displays[1], second)?;
-        Ok([&first.view, &second.view])
-    }
-
-    fn draw(&self, display: &Display, target: &DisplayTexture) -> Result<()> {
         if self.samples == 0 {
             self.context.guard("rendering", || {
                 let mut encoder = self.context.device().create_command_encoder(&Default::default());
@@ -362,8 +340,9 @@ impl Renderer {
             &view,
             environment,
             &self.black,
-            target,
-        )
+            &self.frame.display,
+        )?;
+        Ok(&self.frame.display.view)
     }
 
     /// Draws the picture and reads it back: RGBA, encoded, rows from top to bottom. Waits for the device.

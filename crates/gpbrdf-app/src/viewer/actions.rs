@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use eframe::egui::Context;
 
-use super::app::Viewer;
+use super::app::{Viewer, Windows};
 use super::dialogs::{self, Purpose};
 use super::document::Work;
 use super::export;
@@ -33,6 +33,7 @@ impl Viewer {
                     document.asked = None;
                 }
             }
+            Action::Cancel if self.windows != Windows::default() => self.windows = Windows::default(),
             Action::Cancel => {
                 if let Some(document) = self.documents.iter_mut().find(|d| Some(d.id) == self.selected)
                     && document.is_busy()

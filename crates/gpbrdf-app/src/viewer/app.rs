@@ -17,7 +17,7 @@ use super::mailbox::Sender;
 use super::messages::Messages;
 use super::plots_panel::PlotCache;
 use super::quality::Quality;
-use super::scene::{SceneImage, SceneKey, SceneRequest};
+use super::scene::{SceneKey, SceneRequest};
 use super::settings::Settings;
 use super::shortcuts;
 use super::slices::{SliceKey, SliceRequest};
@@ -38,6 +38,16 @@ pub(crate) struct ShownSpheres {
     pub(crate) mean: TextureHandle,
     pub(crate) difference: Option<TextureHandle>,
     pub(crate) sigma: Option<TextureHandle>,
+}
+
+/// An object as textures.
+pub(crate) struct ShownScene {
+    pub(crate) document: DocumentId,
+    pub(crate) picture: u64,
+    pub(crate) texture: TextureHandle,
+    /// The prediction, where `texture` is the truth alone.
+    pub(crate) beside: Option<TextureHandle>,
+    pub(crate) samples: u32,
 }
 
 /// How long the window's own work takes.
@@ -74,9 +84,9 @@ pub struct Viewer {
     pub(crate) slicer: Sender<SliceRequest>,
     pub(crate) integrator: Sender<Vec<AlbedoRequest>>,
     pub(crate) renderer: Sender<SphereRequest>,
-    pub(crate) sceneries: Option<Sender<SceneRequest>>,
+    pub(crate) scenery: Option<Sender<SceneRequest>>,
     pub(crate) staged: Option<SceneKey>,
-    pub(crate) scene: Option<SceneImage>,
+    pub(crate) scene: Option<ShownScene>,
     pub(crate) quality: Option<Quality>,
     /// Why the window's device is gone, once it is.
     pub(crate) lost: Option<String>,
@@ -164,10 +174,10 @@ impl Viewer {
             slicer: slices::spawn(outbox.clone())?,
             integrator: curves::spawn(outbox.clone())?,
             renderer: spheres::spawn(outbox.clone(), busy)?,
+            scenery: Some(scene::spawn(outbox.clone(), None, fitter.busy())?),
             fitter,
             outbox,
             events,
-            sceneries: None,
             staged: None,
             scene: None,
             quality: None,
@@ -192,24 +202,32 @@ impl Viewer {
         })
     }
 
-    /// Lights objects on the window's device, and listens for its loss.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn use_device(&mut self, state: &eframe::egui_wgpu::RenderState) -> Result<()> {
+    /// Listens for the loss of the window's device.
+    pub fn watch_device(&self, state: &eframe::egui_wgpu::RenderState) {
         let (outbox, adapter) = (self.outbox.clone(), state.adapter.get_info().name);
         state.device.set_device_lost_callback(move |reason, message| {
             let reason = format!("{reason:?} {message}");
-            let message = format!("the graphics device \"{adapter}\" is lost: {}", reason.trim_end());
-            outbox.send(Event::DeviceLost(message));
+            let message =
+                format!("the window's graphics device \"{adapter}\" was lost: {}", reason.trim_end());
+            outbox.send(Event::WindowLost(message));
         });
-        self.sceneries = Some(scene::spawn(self.outbox.clone(), state.clone(), self.fitter.busy())?);
+    }
+
+    /// Lights objects on this device in place of one of its own.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn use_device(&mut self, context: gpbrdf_render::Context) -> Result<()> {
+        self.scenery = Some(scene::spawn(self.outbox.clone(), Some(context), self.fitter.busy())?);
+        self.staged = None;
         Ok(())
     }
 
-    /// Whether there is a device for objects.
-    pub(crate) fn has_device(&self) -> bool {
-        self.sceneries.is_some()
+    /// Takes leave of the graphics driver, which must not be unloaded under a thread.
+    pub fn close(&mut self) {
+        if let Some(scenery) = self.scenery.take() {
+            scenery.join();
+        }
     }
 
     /// Whether the window's device is gone, so that the window shows nothing any more: time for [`Self::reopened`].
@@ -318,6 +336,9 @@ impl Viewer {
         ctx.all_styles_mut(|style| {
             style.spacing.item_spacing = egui::vec2(8.0, 5.0);
             style.spacing.button_padding = egui::vec2(7.0, 3.0);
+            if let Some(small) = style.text_styles.get_mut(&egui::TextStyle::Small) {
+                small.size = 11.0;
+            }
         });
     }
 }

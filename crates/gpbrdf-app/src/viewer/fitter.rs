@@ -45,13 +45,15 @@ pub(crate) enum Event {
     /// Spheres in colour.
     Spheres(Box<super::spheres::SphereImages>),
     /// An object on the device.
-    Scene(super::scene::SceneImage),
+    Scene(Box<super::scene::SceneImage>),
     /// How close an object's prediction is.
     Quality(super::quality::Quality),
     /// An object cannot be shown: its file is broken or the device refuses.
     SceneFailed(String),
-    /// The window's device is gone.
+    /// The device of objects was lost and is opened anew.
     DeviceLost(String),
+    /// The window's device is gone.
+    WindowLost(String),
     /// Metrics of pictures of a result.
     Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
     /// An environment has been read, or not.

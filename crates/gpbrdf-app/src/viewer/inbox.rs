@@ -5,10 +5,10 @@ use std::time::Instant;
 use eframe::egui::{self, Context, TextureHandle};
 use gpbrdf_core::Hyper;
 
-use super::app::{ShownSlices, ShownSpheres, Viewer};
+use super::app::{ShownScene, ShownSlices, ShownSpheres, Viewer};
 use super::document::Work;
 use super::fitter::Event;
-use super::scene::Shape;
+use super::scene::{SceneImage, Shape};
 use super::{slices, spheres};
 
 impl Viewer {
@@ -31,21 +31,17 @@ impl Viewer {
                 Event::Chosen { purpose, paths } => self.chosen(purpose, &paths),
                 Event::Slices(images) => self.take_slices(ctx, *images),
                 Event::Spheres(images) => self.take_spheres(ctx, images),
-                Event::Scene(image) => self.scene = Some(image),
+                Event::Scene(image) => self.take_scene(ctx, *image),
                 Event::Quality(quality) => self.quality = Some(quality),
-                // What a lost device could not do says nothing more.
-                Event::SceneFailed(_) if self.lost.is_some() => {}
                 Event::SceneFailed(message) => {
                     // The processor's sphere is always there.
                     self.settings.shape = Shape::Sphere;
                     (self.scene, self.quality, self.staged) = (None, None, None);
                     self.messages.error(message);
                 }
-                Event::DeviceLost(message) => {
-                    (self.sceneries, self.scene, self.quality, self.staged) = (None, None, None, None);
-                    if self.lost.is_none() {
-                        self.messages.error(message.clone());
-                    }
+                Event::DeviceLost(message) => self.messages.error(format!("{message}; it is opened anew")),
+                Event::WindowLost(message) => {
+                    self.messages.error(message.clone());
                     self.lost = Some(message);
                 }
                 Event::Albedo(albedos) => self.albedos = albedos,
@@ -117,6 +113,14 @@ impl Viewer {
             textures[i] = Some(upload(ctx, &mut old[i], format!("slice {i}"), panel.image));
         }
         self.slices = Some(ShownSlices { key: images.key, textures, limits });
+    }
+
+    fn take_scene(&mut self, ctx: &Context, new: SceneImage) {
+        let (first, second) = self.scene.take().map_or((None, None), |s| (Some(s.texture), s.beside));
+        let texture = upload(ctx, &mut { first }, "object".to_owned(), new.image);
+        let beside = new.beside.map(|image| upload(ctx, &mut { second }, "object beside".to_owned(), image));
+        let (document, picture, samples) = (new.document, new.picture, new.samples);
+        self.scene = Some(ShownScene { document, picture, texture, beside, samples });
     }
 
     fn take_spheres(&mut self, ctx: &Context, images: Box<spheres::SphereImages>) {

@@ -82,6 +82,9 @@ impl eframe::App for Window {
     }
 
     fn on_exit(&mut self) {
+        if let Some(viewer) = &mut self.viewer {
+            viewer.close();
+        }
         *self.kept.borrow_mut() = self.viewer.take().filter(Viewer::has_lost_device);
     }
 }
@@ -120,12 +123,12 @@ fn run(files: &[PathBuf], kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result 
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
     let made = |creation: &eframe::CreationContext<'_>| {
         let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
-        let mut viewer = match kept.borrow_mut().take() {
+        let viewer = match kept.borrow_mut().take() {
             Some(old) => Viewer::reopened(&creation.egui_ctx, old)?,
             None => Viewer::new(&creation.egui_ctx, settings, files)?,
         };
         if let Some(state) = &creation.wgpu_render_state {
-            viewer.use_device(state)?;
+            viewer.watch_device(state);
         }
         Ok(Box::new(Window { viewer: Some(viewer), kept: Rc::clone(kept) }) as Box<dyn eframe::App>)
     };

@@ -3,8 +3,8 @@
 use eframe::egui::{self, Align2, Color32, Rect, RichText, Ui, pos2, vec2};
 use gpbrdf_core::Colormap;
 
-use super::app::Viewer;
-use super::scene::{LIMIT, Orbit, SceneImage};
+use super::app::{ShownScene, Viewer};
+use super::scene::{LIMIT, Orbit};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::sphere_panel::{psnr_text, square};
@@ -24,18 +24,15 @@ impl Viewer {
         let scale = ui.pixels_per_point().min(1.25);
         self.scene_size = [one.width(), one.height()].map(|x| pixels(x * scale));
         let Some(id) = self.document().map(|d| d.id) else { return };
-        if !self.has_device() {
-            let text = self.lost.as_deref().unwrap_or("Objects need a graphics device");
-            ui.put(area, egui::Label::new(text).wrap());
-        } else if let Some(scene) = self.scene.as_ref().filter(|s| s.document == id) {
+        if let Some(scene) = self.scene.as_ref().filter(|s| s.document == id) {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            match scene.beside {
+            match &scene.beside {
                 Some(beside) => {
-                    ui.painter().image(scene.texture, left, uv, Color32::WHITE);
-                    ui.painter().image(beside, right, uv, Color32::WHITE);
+                    ui.painter().image(scene.texture.id(), left, uv, Color32::WHITE);
+                    ui.painter().image(beside.id(), right, uv, Color32::WHITE);
                 }
                 None => {
-                    ui.painter().image(scene.texture, picture, uv, Color32::WHITE);
+                    ui.painter().image(scene.texture.id(), picture, uv, Color32::WHITE);
                 }
             }
             self.captions_ui(ui, picture, has_truth);
@@ -74,7 +71,7 @@ impl Viewer {
     }
 
     /// Scale, metrics and how smooth the picture is.
-    fn foot_ui(&self, ui: &mut Ui, picture: Rect, scene: &SceneImage, has_truth: bool) {
+    fn foot_ui(&self, ui: &mut Ui, picture: Rect, scene: &ShownScene, has_truth: bool) {
         let rect = Rect::from_min_max(picture.left_bottom() + vec2(6.0, -30.0), picture.max - vec2(6.0, 6.0));
         let scale = match self.settings.sphere {
             SphereShown::Difference if has_truth => Some((Colormap::Diverging, -f64::from(LIMIT))),

@@ -37,7 +37,7 @@ impl Viewer {
     }
 
     fn request_scene(&mut self) {
-        let Some(sender) = self.sceneries.as_ref().filter(|_| self.settings.shape != Shape::Sphere) else {
+        let Some(sender) = self.scenery.as_ref().filter(|_| self.settings.shape != Shape::Sphere) else {
             return;
         };
         let views = [Arrangement::All, Arrangement::Sphere];

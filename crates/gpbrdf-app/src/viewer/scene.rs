@@ -1,17 +1,18 @@
-//! Objects lit on the window's own device, progressively, by a thread that the newest request steers.
+//! Objects lit on a graphics device, progressively, by a thread that the newest request steers.
+//!
+//! The device is not the window's: what the window waits for would wait for the lighting too, and a window that changes
+//! its size wants its device to be idle.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use eframe::egui::TextureId;
-use eframe::egui_wgpu::RenderState;
-use eframe::wgpu::{FilterMode, TextureView};
+use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
-    Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light, Mesh, Precision,
-    Renderer, Show, read_obj,
+    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
+    Mesh, Precision, Renderer, Show, read_obj,
 };
 use serde::{Deserialize, Serialize};
 
@@ -127,15 +128,15 @@ pub(crate) struct SceneRequest {
     pub(crate) environment: Arc<Environment>,
 }
 
-/// A picture on the device.
+/// A picture of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneImage {
     pub(crate) document: DocumentId,
     /// Tells this picture, however smooth it gets, from all others.
     pub(crate) picture: u64,
-    pub(crate) texture: TextureId,
-    /// The prediction, where `texture` is the truth alone.
-    pub(crate) beside: Option<TextureId>,
+    pub(crate) image: ColorImage,
+    /// The prediction, where `image` is the truth alone.
+    pub(crate) beside: Option<ColorImage>,
     pub(crate) samples: u32,
 }
 
@@ -144,31 +145,48 @@ const SAMPLES: u32 = 192;
 /// End of the scales of false colours.
 pub(crate) const LIMIT: f32 = 0.1;
 
-/// Starts the thread that renders; beyond the first samples it lets the fitter go first.
+/// Why there is no picture.
+enum Stop {
+    /// The device is gone; another one may do.
+    Lost(String),
+    /// With a message.
+    Error(String),
+}
+
+impl From<gpbrdf_render::Error> for Stop {
+    fn from(error: gpbrdf_render::Error) -> Self {
+        let lost = matches!(error, gpbrdf_render::Error::Lost { .. });
+        if lost { Self::Lost(error.to_string()) } else { Self::Error(error.to_string()) }
+    }
+}
+
+/// Starts the thread that renders, on a device of its own unless one is given; beyond the first samples it lets the
+/// fitter go first.
 pub(crate) fn spawn(
     outbox: Outbox,
-    state: RenderState,
+    context: Option<Context>,
     busy: impl Fn() -> bool + Send + 'static,
 ) -> std::io::Result<Sender<SceneRequest>> {
-    let mut scene = Scene {
-        textures: Textures { state, shown: [None, None] },
-        renderer: None,
-        materials: None,
-        last: None,
-        picture: 0,
-        measurer: Measurer::spawn(outbox.clone())?,
-    };
+    let measurer = Measurer::spawn(outbox.clone())?;
+    let mut scene = Scene { context, renderer: None, materials: None, last: None, picture: 0, measurer };
     Mailbox::spawn("scene", move |request: SceneRequest, stale| {
-        if let Err(message) = scene.render(&request, &outbox, stale, &busy) {
-            (scene.renderer, scene.materials, scene.last) = (None, None, None);
+        let mut result = scene.render(&request, &outbox, stale, &busy);
+        if let Err(Stop::Lost(message)) = &result {
+            let name = scene.context.as_ref().map_or_else(String::new, |c| c.info().name.clone());
+            scene.forget(true);
+            outbox.send(Event::DeviceLost(format!("the graphics device \"{name}\" is lost: {message}")));
+            result = scene.render(&request, &outbox, stale, &busy);
+        }
+        if let Err(Stop::Lost(message) | Stop::Error(message)) = result {
+            scene.forget(false);
             outbox.send(Event::SceneFailed(message));
         }
     })
 }
 
 struct Scene {
-    textures: Textures,
-    renderer: Option<(Context, Renderer)>,
+    context: Option<Context>,
+    renderer: Option<Renderer>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
     picture: u64,
@@ -181,69 +199,49 @@ struct Materials {
     prediction: (u64, bool, BrdfTexture),
 }
 
-/// Pictures as the window knows them.
-struct Textures {
-    state: RenderState,
-    shown: [Option<(TextureId, TextureView)>; 2],
-}
-
-impl Textures {
-    /// The name of a picture.
-    fn id(&mut self, slot: usize, view: &TextureView) -> TextureId {
-        let device = &self.state.device;
-        let id = match &self.shown[slot] {
-            Some((id, known)) if known == view => return *id,
-            Some((id, _)) => {
-                let mut renderer = self.state.renderer.write();
-                renderer.update_egui_texture_from_wgpu_texture(device, view, FilterMode::Linear, *id);
-                *id
-            }
-            None => self.state.renderer.write().register_native_texture(device, view, FilterMode::Linear),
-        };
-        self.shown[slot] = Some((id, view.clone()));
-        id
-    }
-}
-
-fn say(error: gpbrdf_render::Error) -> String {
-    error.to_string()
-}
-
 impl Scene {
+    /// Drops what is on the device, which may be in any state, and the device too where it is `lost`.
+    fn forget(&mut self, lost: bool) {
+        (self.renderer, self.materials, self.last) = (None, None, None);
+        if lost {
+            self.context = None;
+        }
+    }
+
     fn render(
         &mut self,
         request: &SceneRequest,
         outbox: &Outbox,
         stale: &(dyn Fn() -> bool + Sync),
         busy: &dyn Fn() -> bool,
-    ) -> Result<(), String> {
+    ) -> Result<(), Stop> {
         let key = &request.key;
         self.prepare(request)?;
-        let Some((_, renderer)) = &mut self.renderer else { return Ok(()) };
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let display = Display {
             exposure: key.exposure.max(1e-6),
             background: if key.light.point { Background::Black } else { Background::Environment },
             limit: LIMIT,
             ..Display::default()
         };
-        let displays = key.show().map(|show| Display { show, ..display });
+        let shown = |renderer: &mut Renderer, show: Show| -> Result<ColorImage, Stop> {
+            let pixels = renderer.read_display(&Display { show, ..display })?;
+            let pixels = pixels.into_iter().map(|[r, g, b, _]| Color32::from_rgb(r, g, b)).collect();
+            Ok(ColorImage::new(key.size.map(|side| side as usize), pixels))
+        };
+        let [first, second] = key.show();
         let mut step = 1;
         loop {
             if renderer.samples() < SAMPLES {
-                renderer.render_more(step).map_err(say)?;
+                renderer.render_more(step)?;
             }
-            let (texture, beside) = if key.is_pair() {
-                let [truth, prediction] = renderer.display_pair(&displays).map_err(say)?;
-                (self.textures.id(0, truth), Some(self.textures.id(1, prediction)))
-            } else {
-                (self.textures.id(0, renderer.display(&displays[0]).map_err(say)?), None)
-            };
-            renderer.wait().map_err(say)?;
+            let image = shown(renderer, first)?;
+            let beside = if key.is_pair() { Some(shown(renderer, second)?) } else { None };
             let (document, picture, samples) = (key.document, self.picture, renderer.samples());
-            outbox.send(Event::Scene(SceneImage { document, picture, texture, beside, samples }));
+            outbox.send(Event::Scene(Box::new(SceneImage { document, picture, image, beside, samples })));
             let last = samples >= SAMPLES;
             if key.has_truth && self.measurer.wants(picture, samples, last) {
-                let linear = renderer.read_linear().map_err(say)?;
+                let linear = renderer.read_linear()?;
                 let exposure = f64::from(display.exposure);
                 self.measurer.put(Measured { document, picture, samples, exposure, linear });
             }
@@ -258,33 +256,34 @@ impl Scene {
     }
 
     /// Hands the renderer what has changed.
-    fn prepare(&mut self, request: &SceneRequest) -> Result<(), String> {
+    fn prepare(&mut self, request: &SceneRequest) -> Result<(), Stop> {
         let key = &request.key;
+        let context = match &self.context {
+            Some(context) => context.clone(),
+            None => self.context.insert(Context::open(AdapterChoice::Any)?).clone(),
+        };
         if self.renderer.is_none() {
-            let state = &self.textures.state;
-            let context = Context::from_device(&state.adapter, state.device.clone(), state.queue.clone());
-            let renderer = Renderer::new(&context, key.size).map_err(say)?;
-            self.renderer = Some((context, renderer));
+            self.renderer = Some(Renderer::new(&context, key.size)?);
         }
-        self.set_materials(request)?;
-        let Some((_, renderer)) = &mut self.renderer else { return Ok(()) };
+        self.set_materials(&context, request)?;
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
         if changed(&|l| l.shape == key.shape) {
-            renderer.set_geometry(&key.shape.geometry()?).map_err(say)?;
+            renderer.set_geometry(&key.shape.geometry().map_err(Stop::Error)?)?;
         }
         if changed(&|l| l.size == key.size) {
-            renderer.resize(key.size).map_err(say)?;
+            renderer.resize(key.size)?;
         }
         if changed(&|l| l.orbit == key.orbit) {
             let orbit = key.orbit;
             let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
-            renderer.set_camera(camera.zoomed(orbit.zoom)).map_err(say)?;
+            renderer.set_camera(camera.zoomed(orbit.zoom))?;
         }
         // A point light turns with the eye.
         let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
         if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
-            renderer.set_light(light(key, &request.environment)).map_err(say)?;
+            renderer.set_light(light(key, &request.environment))?;
         }
         if renderer.samples() == 0 || changed(&|l| l.exposure == key.exposure) {
             self.picture += 1;
@@ -293,8 +292,8 @@ impl Scene {
         Ok(())
     }
 
-    fn set_materials(&mut self, request: &SceneRequest) -> Result<(), String> {
-        let Some((context, renderer)) = &mut self.renderer else { return Ok(()) };
+    fn set_materials(&mut self, context: &Context, request: &SceneRequest) -> Result<(), Stop> {
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let key = &request.key;
         let known = self.materials.as_ref();
         let same_truth = known
@@ -308,17 +307,14 @@ impl Scene {
         let truth = match (&request.truth, self.materials.take()) {
             (None, _) => None,
             (Some(_), Some(Materials { truth: Some(truth), .. })) if same_truth => Some(truth),
-            (Some(table), _) => {
-                Some((key.document, BrdfTexture::upload(context, table, None, precision).map_err(say)?))
-            }
+            (Some(table), _) => Some((key.document, BrdfTexture::upload(context, table, None, precision)?)),
         };
         let sigma = request
             .sigma
             .as_ref()
             .and_then(|table| SigmaTable::from_planes(vec![table.values().iter().map(|v| v[0]).collect()]));
-        let prediction =
-            BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision).map_err(say)?;
-        renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction).map_err(say)?;
+        let prediction = BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision)?;
+        renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction)?;
         self.materials = Some(Materials { truth, prediction: (key.version, key.has_sigma, prediction) });
         Ok(())
     }

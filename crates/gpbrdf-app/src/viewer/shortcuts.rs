@@ -1,6 +1,6 @@
 //! Keyboard shortcuts: one list for the keys, the menus and the help.
 
-use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
+use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers};
 
 /// What a key does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,11 @@ pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 13] = [
     (Action::ToggleLog, KeyboardShortcut::new(Modifiers::NONE, Key::L), "Plots: logarithmic or linear"),
     (Action::ToggleCosine, KeyboardShortcut::new(Modifiers::NONE, Key::C), "Plots: times the cosine"),
     (Action::Optimise, KeyboardShortcut::new(Modifiers::NONE, Key::O), "Optimise the hyper-parameters"),
-    (Action::Cancel, KeyboardShortcut::new(Modifiers::NONE, Key::Escape), "Cancel the running work"),
+    (
+        Action::Cancel,
+        KeyboardShortcut::new(Modifiers::NONE, Key::Escape),
+        "Close windows, cancel the running work",
+    ),
     (Action::Overview, KeyboardShortcut::new(Modifiers::NONE, Key::Num1), "Show everything"),
     (Action::Slices, KeyboardShortcut::new(Modifiers::NONE, Key::Num2), "Show slices only"),
     (Action::Plots, KeyboardShortcut::new(Modifiers::NONE, Key::Num3), "Show plots only"),
@@ -58,11 +62,14 @@ pub(crate) fn text(ctx: &Context, action: Action) -> String {
 /// The actions whose keys were pressed. Plain letters go to a text field that has the focus.
 pub(crate) fn pressed(ctx: &Context) -> Vec<Action> {
     let typing = ctx.text_edit_focused();
+    let menu = egui::Popup::is_any_open(ctx);
     let mut found = Vec::new();
     ctx.input_mut(|input| {
         for (action, shortcut, _) in &SHORTCUTS {
             let plain = shortcut.modifiers == Modifiers::NONE && shortcut.logical_key != Key::F1;
-            if !(plain && typing) && input.consume_shortcut(shortcut) {
+            // Escape closes a menu first.
+            let taken = plain && typing || menu && *action == Action::Cancel;
+            if !taken && input.consume_shortcut(shortcut) {
                 found.push(*action);
             }
         }

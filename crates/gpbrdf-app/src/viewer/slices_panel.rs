@@ -10,7 +10,7 @@ use super::app::Viewer;
 use super::curves::band_at;
 use super::document::Document;
 use super::slices::{Channel, colour};
-use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui};
+use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui, tools_menu_ui};
 
 /// Titles of the four views.
 const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
@@ -119,7 +119,7 @@ impl Viewer {
             }
             segments_ui(ui, &mut look.channel, &Channel::ALL, Channel::name);
             ui.add_space(6.0);
-            ui.menu_button("Show", |ui| {
+            tools_menu_ui(ui, "Show", |ui| {
                 ui.checkbox(&mut look.square_theta_h, "Square θh")
                     .on_hover_text("The table's own warp: more room for the specular peak");
                 ui.checkbox(&mut look.chroma, "Chroma")

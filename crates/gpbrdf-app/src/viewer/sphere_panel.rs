@@ -9,7 +9,7 @@ use super::scene::{Orbit, Shape};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::spheres::SphereLight;
-use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short};
+use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tools_menu_ui};
 
 /// What the views are called, with what the mouse does in them.
 const SPHERE_HELP: &str = "Sphere view: drag or arrow keys turn the light";
@@ -22,8 +22,8 @@ impl Viewer {
             ui.label(RichText::new("3-D").strong().size(15.0));
             ui.add_space(6.0);
             segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name);
-            ui.menu_button("Shape", |ui| self.shape_ui(ui));
-            ui.menu_button("Light", |ui| self.light_ui(ui));
+            tools_menu_ui(ui, "Shape", |ui| self.shape_ui(ui));
+            tools_menu_ui(ui, "Light", |ui| self.light_ui(ui));
         });
         let Some(id) = self.document().map(|d| d.id) else { return };
         let area = ui.available_rect_before_wrap();
@@ -146,20 +146,16 @@ impl Viewer {
     }
 
     fn shape_ui(&mut self, ui: &mut Ui) {
-        let device = self.has_device();
         let mut shapes = vec![Shape::Sphere, Shape::Knot, Shape::RoundedBox];
         if let Shape::File(_) = &self.settings.shape {
             shapes.push(self.settings.shape.clone());
         }
         for shape in shapes {
-            let (chosen, possible) = (self.settings.shape == shape, device || shape == Shape::Sphere);
-            let radio = egui::RadioButton::new(chosen, shape.name());
-            let response = ui.add_enabled(possible, radio).on_disabled_hover_text("Needs a graphics device");
-            if response.clicked() {
+            if ui.radio(self.settings.shape == shape, shape.name()).clicked() {
                 self.settings.shape = shape;
             }
         }
-        if ui.add_enabled(device, egui::Button::new("OBJ file…")).clicked() {
+        if ui.button("OBJ file…").clicked() {
             self.ask_where(Purpose::Object, "");
             ui.close();
         }

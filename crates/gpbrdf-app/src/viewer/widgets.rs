@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use eframe::egui::containers::menu::{MenuButton, MenuConfig};
 use eframe::egui::{self, ComboBox, Key, Response, RichText, Slider, Ui};
 
 /// Width of the labels of a form.
@@ -157,6 +158,12 @@ pub(crate) fn tool_ui(ui: &mut Ui, number: Number<'_>, width: f32, value: &mut f
         number.slider_ui(ui, value)
     })
     .inner
+}
+
+/// A menu of tools, which stays open while they are used.
+pub(crate) fn tools_menu_ui(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui)) {
+    let config = MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new(name).config(config).ui(ui, content);
 }
 
 /// Buttons of which one is down; whether another is now.
