@@ -64,7 +64,7 @@ impl Driver {
         let start = Instant::now();
         self.harness.run_steps(2);
         while !done(self) {
-            assert!(start.elapsed() < PATIENCE, "waited in vain: {what}");
+            assert!(start.elapsed() < PATIENCE, "waited in vain: {what}; there is {:?}", self.texts());
             std::thread::sleep(Duration::from_millis(5));
             self.harness.step();
         }

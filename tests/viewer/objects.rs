@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::Key;
 use eframe::egui_wgpu::RendererOptions;
+use eframe::wgpu::PollType;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use gpbrdf_app::viewer::Viewer;
@@ -198,6 +199,7 @@ fn a_window_whose_device_is_lost_goes_on_in_another_one() {
     let state = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
     driver.viewer().watch_device(&state);
     state.device.destroy();
+    let _told = state.device.poll(PollType::Poll);
     driver.wait("a message", |d| d.shows("was lost"));
     assert!(driver.viewer().has_lost_device());
     let old = driver.harness.state_mut().take().unwrap();

@@ -100,7 +100,7 @@ fn files_of_every_kind_are_opened_at_once() {
         channels: gpbrdf_core::ExrChannels::Rgb(grey.values()),
     };
     write_table_exr(path("layers.exr"), &[mean]).unwrap();
-    let rows = (0..60).map(|i| format!("{},{},{},0.1,0.2,0.3\n", i % 60, (7 * i) % 50, (13 * i) % 180));
+    let rows = (0..60).map(|i| format!("{},{},{},0.1,0.2,0.3\n", i % 30, (7 * i) % 50, (13 * i) % 180));
     std::fs::write(
         path("scattered.csv"),
         format!("theta_h,theta_d,phi_d,r,g,b\n{}", rows.collect::<String>()),

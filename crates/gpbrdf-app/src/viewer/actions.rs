@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use eframe::egui::Context;
+use eframe::egui::{self, Context};
 
 use super::app::{Viewer, Windows};
 use super::dialogs::{self, Purpose};
@@ -23,6 +23,7 @@ impl Viewer {
             }
             Action::SaveSession => self.ask_where(Purpose::SaveSession, "session.json"),
             Action::Screenshot => export::screenshot(ctx, self),
+            Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Action::TogglePanels => self.settings.panels ^= true,
             Action::Help => self.windows.help ^= true,
             Action::ToggleLog => self.settings.curves.log ^= true,

@@ -50,8 +50,8 @@ impl Viewer {
                         }
                     }
                 });
-                if ui.button("Quit").clicked() {
-                    ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+                if item(ui, "Quit", Action::Quit) {
+                    self.act(&ctx, Action::Quit);
                 }
             });
             ui.menu_button("Materials", |ui| {

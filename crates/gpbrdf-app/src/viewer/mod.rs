@@ -67,8 +67,12 @@ struct Window {
 const SETTINGS: &str = "gpbrdf-viewer";
 
 impl eframe::App for Window {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let Some(viewer) = &mut self.viewer else { return };
+        if let Some(state) = frame.wgpu_render_state() {
+            // A loss is told to who asks.
+            let _told = state.device.poll(eframe::wgpu::PollType::Poll);
+        }
         viewer.ui(ui);
         if viewer.has_lost_device() {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);

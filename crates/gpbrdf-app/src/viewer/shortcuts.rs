@@ -8,6 +8,7 @@ pub(crate) enum Action {
     Open,
     SaveSession,
     Screenshot,
+    Quit,
     TogglePanels,
     Help,
     ToggleLog,
@@ -21,10 +22,11 @@ pub(crate) enum Action {
 }
 
 /// Every shortcut: action, key, what it says in the help.
-pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 13] = [
+pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 14] = [
     (Action::Open, KeyboardShortcut::new(Modifiers::COMMAND, Key::O), "Open materials"),
     (Action::SaveSession, KeyboardShortcut::new(Modifiers::COMMAND, Key::S), "Save the session"),
     (Action::Screenshot, KeyboardShortcut::new(Modifiers::COMMAND, Key::P), "Screenshot to PNG and EXR"),
+    (Action::Quit, KeyboardShortcut::new(Modifiers::COMMAND, Key::Q), "Quit"),
     (Action::TogglePanels, KeyboardShortcut::new(Modifiers::NONE, Key::F1), "Hide or show the panels"),
     (Action::Help, KeyboardShortcut::new(Modifiers::NONE, Key::H), "This help"),
     (Action::ToggleLog, KeyboardShortcut::new(Modifiers::NONE, Key::L), "Plots: logarithmic or linear"),

@@ -278,11 +278,11 @@ fn whole(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
     rim_ui(ui, rect, clip, texture.size()[0]);
 }
 
-/// Hides the steps of a sphere's last one and a half pixels, of `pixels` across, under a smooth ring of the background.
+/// Hides the steps of a sphere's last two pixels, of `pixels` across, under a smooth ring of the background.
 fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, pixels: usize) {
     let radius = 0.5 * disc.width();
     let stroke =
-        egui::Stroke::new(6.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
+        egui::Stroke::new(9.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
     ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), radius, stroke);
 }
 

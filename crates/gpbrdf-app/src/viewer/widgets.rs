@@ -138,7 +138,7 @@ pub(crate) fn choice_ui<T: Copy + PartialEq>(
     let before = *value;
     row_ui(ui, label, |ui| {
         let width = ui.available_width() - 8.0;
-        let combo = ComboBox::from_id_salt(label).width(width).selected_text(name(*value));
+        let combo = ComboBox::from_id_salt(label).width(width).truncate().selected_text(name(*value));
         let shown = combo.show_ui(ui, |ui| {
             for &option in all {
                 ui.selectable_value(value, option, name(option));
@@ -174,10 +174,11 @@ pub(crate) fn segments_ui<T: Copy + PartialEq>(
     name: impl Fn(T) -> &'static str,
 ) -> bool {
     let before = *value;
-    ui.spacing_mut().item_spacing.x = 2.0;
+    let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.x, 2.0);
     for &option in all {
         ui.selectable_value(value, option, name(option));
     }
+    ui.spacing_mut().item_spacing.x = gap;
     *value != before
 }
 
