@@ -169,6 +169,13 @@ pub(crate) fn exists(path: &Path) -> bool {
     path.metadata().is_ok_and(|m| m.len() > 0)
 }
 
+/// A part of a picture.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the window")]
+pub(crate) fn crop(picture: &image::RgbaImage, rect: egui::Rect) -> image::RgbaImage {
+    let [x, y, w, h] = [rect.min.x, rect.min.y, rect.width(), rect.height()].map(|v| v as u32);
+    image::imageops::crop_imm(picture, x, y, w, h).to_image()
+}
+
 /// Width, height and pixels of an EXR file.
 pub(crate) fn read_exr(path: &Path) -> (usize, usize, Vec<[f32; 3]>) {
     let picture = gpbrdf_core::Environment::read(path).unwrap();

@@ -178,7 +178,7 @@ fn settings_and_sessions_bring_back_how_it_looked() {
     driver.press_with_ctrl(Key::S);
     driver.give_path(&session, "Write");
     driver.wait("a note", |d| d.shows("saved session"));
-    let mut restored = Driver::new(&[session.clone()]);
+    let mut restored = Driver::new(std::slice::from_ref(&session));
     restored.fitted();
     same(&restored);
     assert!(restored.harness.query_by_label("Show ward").is_some());

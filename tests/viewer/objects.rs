@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use eframe::egui::Key;
+use eframe::egui::{self, Key};
 use eframe::egui_wgpu::RendererOptions;
 use eframe::wgpu::PollType;
 use egui_kittest::kittest::Queryable;
@@ -11,7 +11,7 @@ use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use gpbrdf_app::viewer::Viewer;
 use gpbrdf_render::{AdapterChoice, Context};
 
-use super::driver::Driver;
+use super::driver::{Driver, crop};
 
 const SIZE: [f32; 2] = [760.0, 460.0];
 
@@ -33,9 +33,7 @@ fn measured_samples(driver: &Driver) -> Option<u32> {
 /// The pixels of the object's view, without captions and metrics.
 fn view(driver: &mut Driver) -> image::RgbaImage {
     let rect = driver.harness.get_by_label_contains("Object view").rect().shrink(40.0);
-    let picture = driver.picture();
-    let [x, y, w, h] = [rect.min.x, rect.min.y, rect.width(), rect.height()].map(|v| v as u32);
-    image::imageops::crop_imm(&picture, x, y, w, h).to_image()
+    crop(&driver.picture(), rect)
 }
 
 fn mean_gap<'a>(pairs: impl Iterator<Item = (&'a image::Rgba<u8>, &'a image::Rgba<u8>)>) -> f64 {
@@ -75,9 +73,10 @@ fn side_by_side_shows_two_whole_objects_and_a_swipe_one() {
     let halves = |driver: &mut Driver| {
         let rect = driver.harness.get_by_label_contains("Object view").rect().shrink(6.0);
         let picture = driver.picture();
-        let half = (0.5 * rect.width()) as u32 - 2;
-        let [x, y, h] = [rect.min.x, rect.min.y + 30.0, rect.height() - 70.0].map(|v| v as u32);
-        [x, x + half + 4].map(|x| image::imageops::crop_imm(&picture, x, y, half, h).to_image())
+        let half = egui::vec2((0.5 * rect.width()).floor() - 2.0, rect.height() - 70.0);
+        let left = rect.min + egui::vec2(0.0, 30.0);
+        let right = left + egui::vec2(half.x + 4.0, 0.0);
+        [left, right].map(|at| crop(&picture, egui::Rect::from_min_size(at, half)))
     };
     let [truth, prediction] = halves(&mut driver);
     // The same object from the same side, but not the same material.

@@ -7,7 +7,7 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT, Queryable};
 use gpbrdf_core::{BrdfTable, ExrPart, write_merl, write_table_exr};
 
-use super::driver::Driver;
+use super::driver::{Driver, crop};
 
 #[test]
 fn a_broken_file_is_named_until_it_is_read_and_nothing_is_lost() {
@@ -106,8 +106,7 @@ fn files_of_every_kind_are_opened_at_once() {
         format!("theta_h,theta_d,phi_d,r,g,b\n{}", rows.collect::<String>()),
     )
     .unwrap();
-    let mut files: Vec<PathBuf> =
-        ["merl.binary", "layers.exr", "scattered.csv"].map(|name| path(name)).to_vec();
+    let mut files: Vec<PathBuf> = ["merl.binary", "layers.exr", "scattered.csv"].map(path).to_vec();
     files.push("lambert".into());
     let mut names = vec!["merl", "layers", "scattered", "lambert"];
     let measured = std::env::var_os("GPBRDF_DATA").map(|d| Path::new(&d).join("rgl/satin_purple_rgb.bsdf"));
@@ -141,15 +140,7 @@ fn materials_are_renamed_hidden_and_drawn_alone() {
     let drawn = |driver: &mut Driver| {
         driver.harness.run_steps(3);
         let rect = driver.harness.get_by_label("Lobe plot").rect();
-        let picture = driver.picture();
-        image::imageops::crop_imm(
-            &picture,
-            rect.min.x as u32,
-            rect.min.y as u32,
-            rect.width() as u32,
-            rect.height() as u32,
-        )
-        .to_image()
+        crop(&driver.picture(), rect)
     };
     let both = drawn(&mut driver);
     driver.harness.get_by_label("Show ward").click();

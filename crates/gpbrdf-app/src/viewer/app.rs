@@ -1,8 +1,8 @@
 //! The program: what is open, what is selected, and what the threads have sent.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -89,7 +89,7 @@ pub struct Viewer {
     pub(crate) scene: Option<ShownScene>,
     pub(crate) quality: Option<Quality>,
     /// Why the window's device is gone, once it is.
-    pub(crate) lost: Option<String>,
+    pub(crate) lost: Arc<OnceLock<String>>,
     /// Where screenshots go; the current folder unless it is set.
     pub(crate) pictures: Option<PathBuf>,
     /// Pixels of the view of objects.
@@ -152,6 +152,9 @@ impl Viewer {
             (document.asked, document.work) = (None, Work::Waiting);
         }
         viewer.messages = std::mem::take(&mut old.messages);
+        if let Some(message) = old.lost.get() {
+            viewer.messages.error(format!("{message}; this is a new window"));
+        }
         viewer.environment = (old.environment.0, old.environment.1.clone(), Arc::clone(&old.environment.2));
         viewer.pictures = old.pictures.take();
         (viewer.selected, viewer.solo, viewer.next_id) = (old.selected, old.solo, old.next_id);
@@ -181,7 +184,7 @@ impl Viewer {
             staged: None,
             scene: None,
             quality: None,
-            lost: None,
+            lost: Arc::default(),
             pictures: None,
             scene_size: [0; 2],
             sliced: None,
@@ -204,12 +207,14 @@ impl Viewer {
 
     /// Listens for the loss of the window's device.
     pub fn watch_device(&self, state: &eframe::egui_wgpu::RenderState) {
-        let (outbox, adapter) = (self.outbox.clone(), state.adapter.get_info().name);
+        let (wake, adapter) = (Arc::clone(&self.outbox.wake), state.adapter.get_info().name);
+        let lost = Arc::clone(&self.lost);
         state.device.set_device_lost_callback(move |reason, message| {
             let reason = format!("{reason:?} {message}");
             let message =
                 format!("the window's graphics device \"{adapter}\" was lost: {}", reason.trim_end());
-            outbox.send(Event::WindowLost(message));
+            let _first_reason_stays = lost.set(message);
+            wake();
         });
     }
 
@@ -233,7 +238,7 @@ impl Viewer {
     /// Whether the window's device is gone, so that the window shows nothing any more: time for [`Self::reopened`].
     #[must_use]
     pub fn has_lost_device(&self) -> bool {
-        self.lost.is_some()
+        self.lost.get().is_some()
     }
 
     /// Sets where screenshots go: the current folder unless this is called.
@@ -299,6 +304,9 @@ impl Viewer {
         let ctx = ui.ctx().clone();
         self.apply_theme(&ctx);
         self.receive(&ctx);
+        if let Some(message) = self.lost.get() {
+            self.messages.error(message.clone());
+        }
         // A frame may be laid out twice; files are dropped once.
         if ctx.current_pass_index() == 0 {
             let dropped = ctx.input(|i| super::dropped_paths(&i.raw));

@@ -52,8 +52,6 @@ pub(crate) enum Event {
     SceneFailed(String),
     /// The device of objects was lost and is opened anew.
     DeviceLost(String),
-    /// The window's device is gone.
-    WindowLost(String),
     /// Metrics of pictures of a result.
     Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
     /// An environment has been read, or not.

@@ -40,10 +40,6 @@ impl Viewer {
                     self.messages.error(message);
                 }
                 Event::DeviceLost(message) => self.messages.error(format!("{message}; it is opened anew")),
-                Event::WindowLost(message) => {
-                    self.messages.error(message.clone());
-                    self.lost = Some(message);
-                }
                 Event::Albedo(albedos) => self.albedos = albedos,
                 other => self.take_stage(other),
             }

@@ -73,9 +73,11 @@ impl eframe::App for Window {
             // A loss is told to who asks.
             let _told = state.device.poll(eframe::wgpu::PollType::Poll);
         }
-        viewer.ui(ui);
         if viewer.has_lost_device() {
+            // Whatever is painted now would end the program.
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        } else {
+            viewer.ui(ui);
         }
     }
 
@@ -107,7 +109,7 @@ pub fn main() -> ExitCode {
             eprintln!("error: cannot open a window: {error}");
             return ExitCode::FAILURE;
         }
-        let lost = kept.borrow().as_ref().and_then(|viewer| viewer.lost.clone());
+        let lost = kept.borrow().as_ref().and_then(|viewer| viewer.lost.get().cloned());
         let Some(message) = lost else { return ExitCode::SUCCESS };
         if start.elapsed() < SOON {
             eprintln!("error: {message}");
