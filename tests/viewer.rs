@@ -6,6 +6,7 @@ mod viewer {
     mod driver;
     mod files;
     mod model;
+    mod mouse;
     mod objects;
     mod opening;
     mod views;

@@ -42,7 +42,8 @@ impl Driver {
     /// A window around a viewer that `make` makes.
     pub(crate) fn around(size: [f32; 2], make: impl FnOnce(&egui::Context) -> Viewer + 'static) -> Self {
         let mut make = Some(make);
-        let builder = Harness::builder().with_size(size).with_theme(egui::Theme::Dark).wgpu();
+        let builder =
+            Harness::builder().with_size(size).with_theme(egui::Theme::Dark).with_step_dt(1.0 / 60.0).wgpu();
         let harness = builder.build_ui_state(
             move |ui, viewer: &mut Option<Viewer>| {
                 if let Some(make) = make.take() {

@@ -26,7 +26,7 @@ fn slices_models_and_sessions_are_written_and_read_again() {
         path
     };
     let png = write(&mut driver, "Export slices…", "out.png");
-    for suffix in ["-truth.exr", "-prediction.exr", "-sigma.exr"] {
+    for suffix in ["-truth.exr", "-prediction.exr", "-difference.exr", "-sigma.exr"] {
         assert!(exists(&png.with_file_name(format!("out{suffix}"))), "{suffix}");
     }
     let model = write(&mut driver, "Save model…", "out.safetensors");

@@ -304,9 +304,6 @@ impl Viewer {
         let ctx = ui.ctx().clone();
         self.apply_theme(&ctx);
         self.receive(&ctx);
-        if let Some(message) = self.lost.get() {
-            self.messages.error(message.clone());
-        }
         // A frame may be laid out twice; files are dropped once.
         if ctx.current_pass_index() == 0 {
             let dropped = ctx.input(|i| super::dropped_paths(&i.raw));

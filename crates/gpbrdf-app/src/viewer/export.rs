@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use eframe::egui::Context;
-use gpbrdf_core::{
-    AtomicFile, Brdf, BrdfTable, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr,
-};
+use gpbrdf_core::{AtomicFile, Brdf, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
 
 use super::app::Viewer;
 use super::fitter::{Event, Outbox};
@@ -61,18 +59,20 @@ pub(crate) fn slices(viewer: &mut Viewer, path: &Path) {
         let picture = slice_figure(&name, truth, fitted.mean.as_ref(), None, &options)?;
         let mut files = vec![png_file(&path, &picture)?];
         let size = [options.size; 2];
-        let mut add = |suffix: &str, brdf: &dyn Brdf| -> Result<()> {
-            let slice = Slice::new(brdf, &options);
-            files.push(exr_file(&beside(&path, suffix), size, slice.values())?);
+        let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
+            files.push(exr_file(&beside(&path, suffix), size, pixels)?);
             Ok(())
         };
-        add("-prediction.exr", fitted.mean.as_ref())?;
+        let mean = Slice::new(fitted.mean.as_ref(), &options);
+        add("-prediction.exr", mean.values())?;
         if let Some(truth) = truth {
-            add("-truth.exr", truth)?;
+            let truth = Slice::new(truth, &options);
+            add("-truth.exr", truth.values())?;
+            let difference = mean.log_difference(&truth)?;
+            add("-difference.exr", &difference.into_iter().map(|gap| [gap; 3]).collect::<Vec<_>>())?;
         }
-        let sigma: Option<&BrdfTable> = fitted.sigma.as_deref();
-        if let Some(sigma) = sigma {
-            add("-sigma.exr", sigma)?;
+        if let Some(sigma) = &fitted.sigma {
+            add("-sigma.exr", Slice::new(sigma.as_ref(), &options).values())?;
         }
         AtomicFile::commit_all(files)?;
         Ok(format!("wrote \"{}\" and the linear slices beside it", path.display()))
