@@ -44,7 +44,7 @@ pub(crate) const SHORTCUTS: [(Action, KeyboardShortcut, &str); 14] = [
 ];
 
 /// What the mouse does, for the help.
-pub(crate) const MOUSE: [(&str, &str); 8] = [
+pub(crate) const MOUSE: [(&str, &str); 9] = [
     ("Left drag", "Pan slices and plots, turn the light of the sphere, orbit objects"),
     ("Right drag, wheel", "Zoom"),
     ("Double click", "Reset the view"),
@@ -52,6 +52,7 @@ pub(crate) const MOUSE: [(&str, &str); 8] = [
     ("Ctrl + drag", "Objects: turn the light"),
     ("Ctrl + click", "A number: back to its default"),
     ("Drop files", "Open them"),
+    ("Tab; arrows, plus, minus, Home", "Go to a view or control; move, zoom and reset the view"),
     ("Ctrl + plus, minus, 0", "Larger, smaller, normal text and controls"),
 ];
 

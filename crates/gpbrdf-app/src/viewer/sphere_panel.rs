@@ -58,7 +58,6 @@ impl Viewer {
                 let line = egui::lerp(disc.left()..=disc.right(), self.settings.swipe);
                 part(ui, truth, disc, [disc.left(), line], picture);
                 part(ui, &shown.mean, disc, [line, disc.right()], picture);
-                rim_ui(ui, disc, picture, truth.size()[0]);
                 let stroke = egui::Stroke::new(1.5, text.gamma_multiply(0.8));
                 let (upper, lower) = (disc.top().max(picture.top()), disc.bottom().min(picture.bottom()));
                 if picture.x_range().contains(line) {
@@ -275,15 +274,6 @@ fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, [left, right]: [f32; 2], c
 /// A whole picture of a sphere, within `clip`.
 fn whole(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
     part(ui, texture, rect, [rect.left(), rect.right()], clip);
-    rim_ui(ui, rect, clip, texture.size()[0]);
-}
-
-/// Hides the steps of a sphere's last two pixels, of `pixels` across, under a smooth ring of the background.
-fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, pixels: usize) {
-    let radius = 0.5 * disc.width();
-    let stroke =
-        egui::Stroke::new(9.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
-    ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), radius, stroke);
 }
 
 /// A peak signal-to-noise ratio for people.

@@ -13,9 +13,12 @@ impl Viewer {
     pub(crate) fn open_window_ui(&mut self, ctx: &Context) {
         let mut open = self.windows.open;
         let mut chosen = None;
-        egui::Window::new("Open materials").open(&mut open).collapsible(false).default_width(420.0).show(
-            ctx,
-            |ui| {
+        egui::Window::new("Open materials")
+            .open(&mut open)
+            .collapsible(false)
+            .vscroll(true)
+            .default_width(420.0)
+            .show(ctx, |ui| {
                 ui.label("A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model or session:");
                 chosen = self.path_row_ui(ui, "Path to open", "Open", Purpose::Open);
                 ui.add_space(6.0);
@@ -27,8 +30,7 @@ impl Viewer {
                         }
                     }
                 });
-            },
-        );
+            });
         self.windows.open = open && self.windows.open;
         if let Some(path) = chosen {
             self.chosen(Purpose::Open, &[path]);
@@ -86,19 +88,25 @@ impl Viewer {
     }
 
     pub(crate) fn help_window_ui(&mut self, ctx: &Context) {
-        egui::Window::new("Shortcuts").open(&mut self.windows.help).collapsible(false).show(ctx, |ui| {
-            egui::Grid::new("shortcuts").num_columns(2).spacing([24.0, 5.0]).striped(true).show(ui, |ui| {
-                for (_, shortcut, what) in &SHORTCUTS {
-                    ui.label(RichText::new(ctx.format_shortcut(shortcut)).strong());
-                    ui.label(*what);
-                    ui.end_row();
-                }
-                for (how, what) in MOUSE {
-                    ui.label(RichText::new(how).strong());
-                    ui.label(what);
-                    ui.end_row();
-                }
-            });
-        });
+        egui::Window::new("Shortcuts").open(&mut self.windows.help).collapsible(false).vscroll(true).show(
+            ctx,
+            |ui| {
+                egui::Grid::new("shortcuts").num_columns(2).spacing([24.0, 5.0]).striped(true).show(
+                    ui,
+                    |ui| {
+                        for (_, shortcut, what) in &SHORTCUTS {
+                            ui.label(RichText::new(ctx.format_shortcut(shortcut)).strong());
+                            ui.label(*what);
+                            ui.end_row();
+                        }
+                        for (how, what) in MOUSE {
+                            ui.label(RichText::new(how).strong());
+                            ui.label(what);
+                            ui.end_row();
+                        }
+                    },
+                );
+            },
+        );
     }
 }
