@@ -52,14 +52,37 @@ fn summary(name: &str, mut times: Vec<Duration>) {
     );
 }
 
-fn main() {
-    let mut driver: Driver = Harness::builder().with_size([1440.0, 900.0]).build_ui_state(
-        |ui, viewer: &mut Option<Viewer>| {
-            let made = || Viewer::new(ui.ctx(), Settings::default(), &[]).unwrap();
+fn open(settings: Settings) -> Driver {
+    Harness::builder().with_size([1440.0, 900.0]).build_ui_state(
+        move |ui, viewer: &mut Option<Viewer>| {
+            let made = || Viewer::new(ui.ctx(), settings.clone(), &[]).unwrap();
             viewer.get_or_insert_with(made).ui(ui);
         },
         None,
+    )
+}
+
+/// Frames while an object is lit and measured and the model refitted.
+fn with_an_object() {
+    let mut driver = open(serde_json::from_str("{\"shape\": \"Knot\", \"sphere\": \"SideBySide\"}").unwrap());
+    until(&mut driver, Viewer::is_fitted);
+    driver.state_mut().as_mut().unwrap().reset_frame_times();
+    for i in 0..20 {
+        let before = viewer(&driver).shown_version();
+        slide(&driver, "Length scale θh", 0.03 + 0.001 * f64::from(i));
+        until(&mut driver, |v| v.shown_version() != before);
+    }
+    let frames = viewer(&driver).frame_times();
+    let longest = 1e3 * frames.longest.as_secs_f64();
+    println!(
+        "longest frame of {} while an object is lit and its model fitted: {longest:.1} ms",
+        frames.frames
     );
+    driver.state_mut().as_mut().unwrap().close();
+}
+
+fn main() {
+    let mut driver = open(Settings::default());
     let first = until(&mut driver, |v| v.shown_version() > 0);
     println!("first picture after {:.0} ms", 1e3 * first.as_secs_f64());
     until(&mut driver, Viewer::is_settled);
@@ -97,4 +120,5 @@ fn main() {
             until(&mut driver, |v| v.shown_version() != before);
         }
     }
+    with_an_object();
 }

@@ -9,6 +9,9 @@ use crate::error::{Error, Result};
 /// How long a piece of work may keep the device before it counts as stuck.
 const PATIENCE: Duration = Duration::from_secs(120);
 
+/// Waits for everything.
+const WAIT: wgpu::PollType = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
+
 /// Which adapter to take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
@@ -148,6 +151,10 @@ impl Context {
             let error = pollster::block_on(scope.pop());
             first = first.or(error);
         }
+        if first.is_some() {
+            // The loss that it may come from is told once nothing is left to do.
+            let _told = self.device.poll(WAIT);
+        }
         self.check_lost(what)?;
         match first {
             None => Ok(result),
@@ -170,7 +177,7 @@ impl Context {
     /// # Errors
     /// [`Error::Lost`] when the device is gone or takes over two minutes.
     pub fn wait(&self, what: &str) -> Result<()> {
-        let done = self.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) });
+        let done = self.device.poll(WAIT);
         self.check_lost(what)?;
         done.map(drop).map_err(|error| Error::Lost { what: what.to_owned(), message: error.to_string() })
     }
@@ -330,9 +337,11 @@ impl Context {
         let failed = |message: String| Error::Gpu { what: WHAT.to_owned(), message };
         let answer: Arc<OnceLock<_>> = Arc::default();
         let set = answer.clone();
-        staging.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _set_once = set.set(result);
-        });
+        self.guard(WHAT, || {
+            staging.map_async(wgpu::MapMode::Read, .., move |result| {
+                let _set_once = set.set(result);
+            });
+        })?;
         self.wait(WHAT)?;
         match answer.get() {
             Some(Ok(())) => {}

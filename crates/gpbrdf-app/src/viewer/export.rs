@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result, bail};
 use eframe::egui::Context;
-use gpbrdf_core::{
-    AtomicFile, Brdf, BrdfTable, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr,
-};
+use gpbrdf_core::{AtomicFile, Brdf, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
 
 use super::app::Viewer;
 use super::fitter::{Event, Outbox};
@@ -61,18 +59,20 @@ pub(crate) fn slices(viewer: &mut Viewer, path: &Path) {
         let picture = slice_figure(&name, truth, fitted.mean.as_ref(), None, &options)?;
         let mut files = vec![png_file(&path, &picture)?];
         let size = [options.size; 2];
-        let mut add = |suffix: &str, brdf: &dyn Brdf| -> Result<()> {
-            let slice = Slice::new(brdf, &options);
-            files.push(exr_file(&beside(&path, suffix), size, slice.values())?);
+        let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
+            files.push(exr_file(&beside(&path, suffix), size, pixels)?);
             Ok(())
         };
-        add("-prediction.exr", fitted.mean.as_ref())?;
+        let mean = Slice::new(fitted.mean.as_ref(), &options);
+        add("-prediction.exr", mean.values())?;
         if let Some(truth) = truth {
-            add("-truth.exr", truth)?;
+            let truth = Slice::new(truth, &options);
+            add("-truth.exr", truth.values())?;
+            let difference = mean.log_difference(&truth)?;
+            add("-difference.exr", &difference.into_iter().map(|gap| [gap; 3]).collect::<Vec<_>>())?;
         }
-        let sigma: Option<&BrdfTable> = fitted.sigma.as_deref();
-        if let Some(sigma) = sigma {
-            add("-sigma.exr", sigma)?;
+        if let Some(sigma) = &fitted.sigma {
+            add("-sigma.exr", Slice::new(sigma.as_ref(), &options).values())?;
         }
         AtomicFile::commit_all(files)?;
         Ok(format!("wrote \"{}\" and the linear slices beside it", path.display()))
@@ -118,13 +118,16 @@ pub(crate) fn model(viewer: &mut Viewer, path: &Path) {
     });
 }
 
-/// A picture of the window, as PNG and EXR in the current folder.
-pub(crate) fn screenshot(ctx: &Context, outbox: &Outbox) {
-    let outbox = outbox.clone();
+/// A picture of the window, as PNG and EXR in the folder of screenshots.
+pub(crate) fn screenshot(ctx: &Context, viewer: &Viewer) {
+    let (outbox, folder) = (viewer.outbox.clone(), viewer.pictures.clone());
     ctx.request_screenshot(move |image| {
+        let folder = folder.clone();
         in_background(&outbox, move || {
             let [width, height] = image.size;
-            let path = free_name("gpbrdf-screenshot")?;
+            let folder =
+                folder.map_or_else(std::env::current_dir, Ok).context("cannot find the current folder")?;
+            let path = free_name(&folder, "gpbrdf-screenshot")?;
             let picture = Picture::from_fn(width, height, |x, y| {
                 let [r, g, b, _] = image.pixels[y * width + x].to_array();
                 [r, g, b]
@@ -144,9 +147,9 @@ pub(crate) fn screenshot(ctx: &Context, outbox: &Outbox) {
     });
 }
 
-/// A name in the current folder that no file has.
-fn free_name(stem: &str) -> Result<PathBuf> {
-    let folder = std::env::current_dir().context("cannot find the current folder")?;
-    let names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
-    names.into_iter().find(|p| !p.exists()).context("too many screenshots in this folder")
+/// A name in a folder that no file has.
+fn free_name(folder: &Path, stem: &str) -> Result<PathBuf> {
+    let mut names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
+    let free = names.find(|p| !p.exists() && !p.with_extension("exr").exists());
+    free.with_context(|| format!("too many screenshots in \"{}\"", folder.display()))
 }

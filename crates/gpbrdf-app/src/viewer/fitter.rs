@@ -45,13 +45,17 @@ pub(crate) enum Event {
     /// Spheres in colour.
     Spheres(Box<super::spheres::SphereImages>),
     /// An object on the device.
-    Scene(super::scene::SceneImage),
-    /// An object cannot be shown: its file is broken or the device is gone.
+    Scene(Box<super::scene::SceneImage>),
+    /// How close an object's prediction is.
+    Quality(super::quality::Quality),
+    /// An object cannot be shown: its file is broken or the device refuses.
     SceneFailed(String),
+    /// The device of objects was lost and is opened anew.
+    DeviceLost(String),
     /// Metrics of pictures of a result.
     Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
     /// An environment has been read, or not.
-    Environment { result: Result<(String, Arc<gpbrdf_core::Environment>), String> },
+    Environment { result: Result<(std::path::PathBuf, Arc<gpbrdf_core::Environment>), String> },
 }
 
 /// Sends events and wakes the window.

@@ -29,12 +29,12 @@ impl<T: Send + 'static> Mailbox<T> {
             generation: AtomicU64::new(0),
         });
         let theirs = Arc::clone(&mailbox);
-        std::thread::Builder::new().name(name.into()).spawn(move || {
+        let thread = std::thread::Builder::new().name(name.into()).spawn(move || {
             while let Some((request, generation)) = theirs.take() {
                 serve(request, &|| theirs.generation.load(Ordering::Relaxed) != generation);
             }
         })?;
-        Ok(Sender(mailbox))
+        Ok(Sender { mailbox, thread: Some(thread) })
     }
 
     fn take(&self) -> Option<(T, u64)> {
@@ -53,24 +53,41 @@ impl<T: Send + 'static> Mailbox<T> {
 
 /// The sending side of a mailbox; the thread ends with it.
 #[derive(Debug)]
-pub(crate) struct Sender<T>(Arc<Mailbox<T>>);
+pub(crate) struct Sender<T> {
+    mailbox: Arc<Mailbox<T>>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
 
 impl<T> Sender<T> {
     /// Leaves a request in place of an older one.
     pub(crate) fn put(&self, request: T) {
-        let mut slot = self.0.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut slot = self.mailbox.slot.lock().unwrap_or_else(PoisonError::into_inner);
         slot.request = Some(request);
-        self.0.generation.fetch_add(1, Ordering::Relaxed);
-        self.0.filled.notify_one();
+        self.mailbox.generation.fetch_add(1, Ordering::Relaxed);
+        self.mailbox.filled.notify_one();
+    }
+}
+
+impl<T> Sender<T> {
+    fn close(&self) {
+        let mut slot = self.mailbox.slot.lock().unwrap_or_else(PoisonError::into_inner);
+        slot.closed = true;
+        self.mailbox.generation.fetch_add(1, Ordering::Relaxed);
+        self.mailbox.filled.notify_all();
+    }
+
+    /// Ends the thread and waits for it.
+    pub(crate) fn join(mut self) {
+        self.close();
+        if let Some(thread) = self.thread.take() {
+            let _panicked = thread.join();
+        }
     }
 }
 
 impl<T> Drop for Sender<T> {
     fn drop(&mut self) {
-        let mut slot = self.0.slot.lock().unwrap_or_else(PoisonError::into_inner);
-        slot.closed = true;
-        self.0.generation.fetch_add(1, Ordering::Relaxed);
-        self.0.filled.notify_all();
+        self.close();
     }
 }
 

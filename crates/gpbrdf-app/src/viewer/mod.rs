@@ -4,18 +4,25 @@
 //! takes longer than a frame runs on threads: `fitter` samples, fits and bakes, `slices`, `curves` and `spheres` make
 //! pictures. Each takes the newest request and gives up older ones; results come back as events.
 
+mod actions;
 mod app;
 mod curves;
 mod dialogs;
 mod document;
 mod export;
 mod fitter;
+mod inbox;
 mod layout;
 mod mailbox;
 mod materials_panel;
+mod menu;
 mod messages;
 mod model_panel;
+mod object_panel;
+mod opening;
 mod plots_panel;
+mod quality;
+mod requests;
 mod scene;
 mod session;
 mod settings;
@@ -27,9 +34,13 @@ mod sphere_panel;
 mod spheres;
 mod status;
 mod widgets;
+mod windows;
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 use clap::Parser;
 use eframe::egui;
@@ -47,26 +58,68 @@ struct Arguments {
 
 /// The viewer in a window of eframe.
 struct Window {
-    viewer: Viewer,
+    viewer: Option<Viewer>,
+    /// Where the viewer goes when its window closes for a new one.
+    kept: Rc<RefCell<Option<Viewer>>>,
 }
 
 /// Where eframe keeps the settings.
 const SETTINGS: &str = "gpbrdf-viewer";
 
 impl eframe::App for Window {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        self.viewer.ui(ui);
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let Some(viewer) = &mut self.viewer else { return };
+        if let Some(state) = frame.wgpu_render_state() {
+            // A loss is told to who asks.
+            let _told = state.device.poll(eframe::wgpu::PollType::Poll);
+        }
+        if viewer.has_lost_device() {
+            // Whatever is painted now would end the program.
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        } else {
+            viewer.ui(ui);
+        }
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, SETTINGS, self.viewer.settings());
+        if let Some(viewer) = &self.viewer {
+            eframe::set_value(storage, SETTINGS, viewer.settings());
+        }
+    }
+
+    fn on_exit(&mut self) {
+        if let Some(viewer) = &mut self.viewer {
+            viewer.close();
+        }
+        *self.kept.borrow_mut() = self.viewer.take().filter(Viewer::has_lost_device);
     }
 }
 
-/// Runs the program in a window.
+/// A device that is lost again this soon is not opened anew.
+const SOON: Duration = Duration::from_secs(5);
+
+/// Runs the program in a window, and in another one with what was open when the graphics device is lost.
 #[must_use]
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let files = Arguments::parse().files;
+    let kept = Rc::new(RefCell::new(None));
+    loop {
+        let start = Instant::now();
+        if let Err(error) = run(&files, &kept) {
+            eprintln!("error: cannot open a window: {error}");
+            return ExitCode::FAILURE;
+        }
+        let lost = kept.borrow().as_ref().and_then(|viewer| viewer.lost.get().cloned());
+        let Some(message) = lost else { return ExitCode::SUCCESS };
+        if start.elapsed() < SOON {
+            eprintln!("error: {message}");
+            return ExitCode::FAILURE;
+        }
+    }
+}
+
+/// One window, until it is closed; `kept` is taken over and may be left behind.
+fn run(files: &[PathBuf], kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("gpbrdf viewer")
         .with_app_id("gpbrdf-viewer")
@@ -74,25 +127,18 @@ pub fn main() -> ExitCode {
         .with_min_inner_size([720.0, 480.0])
         .with_drag_and_drop(true);
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
-    let made = eframe::run_native(
-        "gpbrdf-viewer",
-        options,
-        Box::new(move |creation| {
-            let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
-            let mut viewer = Viewer::new(&creation.egui_ctx, settings, &arguments.files)?;
-            if let Some(state) = &creation.wgpu_render_state {
-                viewer.use_device(state)?;
-            }
-            Ok(Box::new(Window { viewer }))
-        }),
-    );
-    match made {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: cannot open a window: {error}");
-            ExitCode::FAILURE
+    let made = |creation: &eframe::CreationContext<'_>| {
+        let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
+        let viewer = match kept.borrow_mut().take() {
+            Some(old) => Viewer::reopened(&creation.egui_ctx, old)?,
+            None => Viewer::new(&creation.egui_ctx, settings, files)?,
+        };
+        if let Some(state) = &creation.wgpu_render_state {
+            viewer.watch_device(state);
         }
-    }
+        Ok(Box::new(Window { viewer: Some(viewer), kept: Rc::clone(kept) }) as Box<dyn eframe::App>)
+    };
+    eframe::run_native("gpbrdf-viewer", options, Box::new(made))
 }
 
 /// The files that were dropped on the window.

@@ -7,8 +7,8 @@ use super::app::Viewer;
 use super::curves::{ALBEDO_ANGLES, CurveKind, CurveLook, CurvePoint, curve, samples_near};
 use super::document::DocumentId;
 use super::slices::Channel;
-use super::slices_panel::zoom;
-use super::widgets::{Number, segments_ui, short};
+use super::slices_panel::{home, zoom};
+use super::widgets::{Number, focus_ui, segments_ui, short, tool_ui};
 
 /// What a curve was made from.
 type Key = (DocumentId, u64, bool, bool, CurveLook);
@@ -36,11 +36,11 @@ struct Drawn {
 impl Viewer {
     /// The plot and its controls.
     pub(crate) fn plots_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Plots").strong().size(15.0));
             ui.add_space(6.0);
             let look = &mut self.settings.curves;
-            ui.scope(|ui| segments_ui(ui, &mut look.kind, &CurveKind::ALL, CurveKind::name));
+            segments_ui(ui, &mut look.kind, &CurveKind::ALL, CurveKind::name);
             ui.separator();
             ui.checkbox(&mut look.log, "Log").on_hover_text("Logarithmic values (L)");
             ui.checkbox(&mut look.times_cosine, "× cos θi")
@@ -91,6 +91,8 @@ impl Viewer {
             }
             zoom(plot);
         });
+        focus_ui(ui, &response.response);
+        self.reset_next |= home(ui, &response.response);
         let name = format!("{} plot", look.kind.name());
         response
             .response
@@ -100,15 +102,11 @@ impl Viewer {
     /// Where the curves stand.
     fn where_ui(&mut self, ui: &mut Ui) {
         let look = &mut self.settings.curves;
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             let slider = |ui: &mut Ui, name: &str, high: f64, default: f64, value: &mut f64| {
-                ui.label(name);
-                ui.scope(|ui| {
-                    ui.set_max_width(170.0);
-                    let mut number = Number::new(name, 0.0..=high, default, "Where the curve stands");
-                    number.suffix = "°";
-                    number.slider_ui(ui, value);
-                });
+                let mut number = Number::new(name, 0.0..=high, default, "Where the curve stands");
+                number.suffix = "°";
+                tool_ui(ui, number, if name.len() > 8 { 260.0 } else { 200.0 }, value);
             };
             let fixed = CurveLook::default().at;
             match look.kind {
@@ -129,7 +127,7 @@ impl Viewer {
                 }
             }
             let names = |c| if c == Channel::Rgb { "Mean" } else { Channel::name(c) };
-            ui.scope(|ui| segments_ui(ui, &mut look.channel, &Channel::ALL, names));
+            segments_ui(ui, &mut look.channel, &Channel::ALL, names);
         });
     }
 

@@ -1,22 +1,25 @@
-//! Objects lit on the window's own device, progressively, by a thread that the newest request steers.
+//! Objects lit on a graphics device, progressively, by a thread that the newest request steers.
+//!
+//! The device is not the window's: what the window waits for would wait for the lighting too, and a window that changes
+//! its size wants its device to be idle.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
-use eframe::egui::TextureId;
-use eframe::egui_wgpu::RenderState;
-use eframe::wgpu::FilterMode;
+use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
-use gpbrdf_core::{BrdfTable, Environment, SigmaTable, psnr, ssim};
+use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
-    Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light, Mesh, Precision,
-    Renderer, Show, read_obj,
+    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
+    Mesh, Precision, Renderer, Show, read_obj,
 };
 use serde::{Deserialize, Serialize};
 
 use super::document::DocumentId;
 use super::fitter::{Event, Outbox};
 use super::mailbox::{Mailbox, Sender};
+use super::quality::{Measured, Measurer};
 use super::settings::SphereShown;
 use super::spheres::SphereLight;
 use super::widgets::narrow;
@@ -90,9 +93,29 @@ pub(crate) struct SceneKey {
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
     pub(crate) exposure: f32,
+    /// Of one picture, of which there are two side by side.
     pub(crate) size: [u32; 2],
     pub(crate) shown: SphereShown,
     pub(crate) swipe: f32,
+}
+
+impl SceneKey {
+    /// Whether truth and prediction are two whole pictures.
+    fn is_pair(&self) -> bool {
+        self.has_truth && self.shown == SphereShown::SideBySide
+    }
+
+    /// What is shown, on each of two pictures where there are two.
+    fn show(&self) -> [Show; 2] {
+        let first = match self.shown {
+            SphereShown::Difference if self.has_truth => Show::Difference,
+            SphereShown::Sigma => Show::Sigma,
+            SphereShown::Swipe if self.has_truth => Show::Split { at: self.swipe },
+            SphereShown::SideBySide if self.has_truth => Show::Truth,
+            _ => Show::Prediction,
+        };
+        [first, Show::Prediction]
+    }
 }
 
 /// A picture to make.
@@ -105,14 +128,16 @@ pub(crate) struct SceneRequest {
     pub(crate) environment: Arc<Environment>,
 }
 
-/// A picture on the device.
+/// A picture of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneImage {
     pub(crate) document: DocumentId,
-    pub(crate) texture: TextureId,
+    /// Tells this picture, however smooth it gets, from all others.
+    pub(crate) picture: u64,
+    pub(crate) image: ColorImage,
+    /// The prediction, where `image` is the truth alone.
+    pub(crate) beside: Option<ColorImage>,
     pub(crate) samples: u32,
-    /// Between truth and prediction, once the picture is smooth.
-    pub(crate) quality: Option<(f64, f64)>,
 }
 
 /// Samples of a smooth picture.
@@ -120,120 +145,155 @@ const SAMPLES: u32 = 192;
 /// End of the scales of false colours.
 pub(crate) const LIMIT: f32 = 0.1;
 
-/// Starts the thread that renders.
-pub(crate) fn spawn(outbox: Outbox, state: RenderState) -> std::io::Result<Sender<SceneRequest>> {
-    let mut scene = Scene { state, renderer: None, texture: None, materials: None, last: None };
+/// Why there is no picture.
+enum Stop {
+    /// The device is gone; another one may do.
+    Lost(String),
+    /// With a message.
+    Error(String),
+}
+
+impl From<gpbrdf_render::Error> for Stop {
+    fn from(error: gpbrdf_render::Error) -> Self {
+        let lost = matches!(error, gpbrdf_render::Error::Lost { .. });
+        if lost { Self::Lost(error.to_string()) } else { Self::Error(error.to_string()) }
+    }
+}
+
+/// Starts the thread that renders, on a device of its own unless one is given; beyond the first samples it lets the
+/// fitter go first.
+pub(crate) fn spawn(
+    outbox: Outbox,
+    context: Option<Context>,
+    busy: impl Fn() -> bool + Send + 'static,
+) -> std::io::Result<Sender<SceneRequest>> {
+    let measurer = Measurer::spawn(outbox.clone())?;
+    let mut scene = Scene { context, renderer: None, materials: None, last: None, picture: 0, measurer };
     Mailbox::spawn("scene", move |request: SceneRequest, stale| {
-        if let Err(message) = scene.render(&request, &outbox, stale) {
-            (scene.renderer, scene.materials, scene.last) = (None, None, None);
+        let mut result = scene.render(&request, &outbox, stale, &busy);
+        if let Err(Stop::Lost(message)) = &result {
+            let name = scene.context.as_ref().map_or_else(String::new, |c| c.info().name.clone());
+            scene.forget(true);
+            outbox.send(Event::DeviceLost(format!("the graphics device \"{name}\" is lost: {message}")));
+            result = scene.render(&request, &outbox, stale, &busy);
+        }
+        if let Err(Stop::Lost(message) | Stop::Error(message)) = result {
+            scene.forget(false);
             outbox.send(Event::SceneFailed(message));
         }
     })
 }
 
 struct Scene {
-    state: RenderState,
-    renderer: Option<(Context, Renderer)>,
-    texture: Option<(TextureId, [u32; 2])>,
+    context: Option<Context>,
+    renderer: Option<Renderer>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
+    picture: u64,
+    measurer: Measurer,
 }
 
-/// Textures, with what they were made from.
+/// BRDFs on the device, with what they were made from.
 struct Materials {
     truth: Option<(DocumentId, BrdfTexture)>,
     prediction: (u64, bool, BrdfTexture),
 }
 
 impl Scene {
+    /// Drops what is on the device, which may be in any state, and the device too where it is `lost`.
+    fn forget(&mut self, lost: bool) {
+        (self.renderer, self.materials, self.last) = (None, None, None);
+        if lost {
+            self.context = None;
+        }
+    }
+
     fn render(
         &mut self,
         request: &SceneRequest,
         outbox: &Outbox,
         stale: &(dyn Fn() -> bool + Sync),
-    ) -> Result<(), String> {
-        let say = |error: gpbrdf_render::Error| error.to_string();
+        busy: &dyn Fn() -> bool,
+    ) -> Result<(), Stop> {
         let key = &request.key;
-        if self.renderer.is_none() {
-            let state = &self.state;
-            let context = Context::from_device(&state.adapter, state.device.clone(), state.queue.clone());
-            let renderer = Renderer::new(&context, key.size).map_err(say)?;
-            self.renderer = Some((context, renderer));
-        }
-        self.set_materials(request)?;
-        let Some((context, renderer)) = &mut self.renderer else { return Ok(()) };
-        let last = self.last.take();
-        let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
-        if changed(&|l| l.shape == key.shape) {
-            renderer.set_geometry(&key.shape.geometry()?).map_err(say)?;
-        }
-        if changed(&|l| l.size == key.size) {
-            renderer.resize(key.size).map_err(say)?;
-        }
-        if changed(&|l| l.orbit == key.orbit) {
-            let orbit = key.orbit;
-            let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
-            renderer.set_camera(camera.zoomed(orbit.zoom)).map_err(say)?;
-        }
-        if changed(&|l| l.light == key.light && l.environment == key.environment && l.orbit == key.orbit)
-            && (key.light.point || changed(&|l| l.light == key.light && l.environment == key.environment))
-        {
-            renderer.set_light(light(key, &request.environment)).map_err(say)?;
-        }
-        let show = match key.shown {
-            SphereShown::Difference if key.has_truth => Show::Difference,
-            SphereShown::Sigma => Show::Sigma,
-            SphereShown::Swipe | SphereShown::SideBySide if key.has_truth => Show::Split { at: key.swipe },
-            _ => Show::Prediction,
-        };
+        self.prepare(request)?;
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let display = Display {
-            show,
             exposure: key.exposure.max(1e-6),
             background: if key.light.point { Background::Black } else { Background::Environment },
             limit: LIMIT,
             ..Display::default()
         };
-        self.last = Some(key.clone());
-        let mut quality = None;
+        let shown = |renderer: &mut Renderer, show: Show| -> Result<ColorImage, Stop> {
+            let pixels = renderer.read_display(&Display { show, ..display })?;
+            let pixels = pixels.into_iter().map(|[r, g, b, _]| Color32::from_rgb(r, g, b)).collect();
+            Ok(ColorImage::new(key.size.map(|side| side as usize), pixels))
+        };
+        let [first, second] = key.show();
         let mut step = 1;
         loop {
-            renderer.render_more(step).map_err(say)?;
-            let view = renderer.display(&display).map_err(say)?.clone();
-            let device = context.device();
-            let texture = match self.texture {
-                Some((texture, size)) if size == key.size => texture,
-                old => {
-                    let mut egui = self.state.renderer.write();
-                    let texture = match old {
-                        Some((id, _)) => {
-                            egui.update_egui_texture_from_wgpu_texture(device, &view, FilterMode::Linear, id);
-                            id
-                        }
-                        None => egui.register_native_texture(device, &view, FilterMode::Linear),
-                    };
-                    self.texture = Some((texture, key.size));
-                    texture
-                }
-            };
-            renderer.wait().map_err(say)?;
-            let samples = renderer.samples();
-            if samples >= SAMPLES && key.has_truth && !stale() {
-                let pictures = renderer.read_linear().and_then(|linear| linear.images()).map_err(say)?;
-                let exposure = f64::from(key.exposure);
-                let found =
-                    (psnr(&pictures.0, &pictures.1, exposure), ssim(&pictures.0, &pictures.1, exposure));
-                quality = found.0.ok().zip(found.1.ok());
+            if renderer.samples() < SAMPLES {
+                renderer.render_more(step)?;
             }
-            outbox.send(Event::Scene(SceneImage { document: key.document, texture, samples, quality }));
-            if stale() || samples >= SAMPLES {
+            let image = shown(renderer, first)?;
+            let beside = if key.is_pair() { Some(shown(renderer, second)?) } else { None };
+            let (document, picture, samples) = (key.document, self.picture, renderer.samples());
+            outbox.send(Event::Scene(Box::new(SceneImage { document, picture, image, beside, samples })));
+            let last = samples >= SAMPLES;
+            if key.has_truth && self.measurer.wants(picture, samples, last) {
+                let linear = renderer.read_linear()?;
+                let exposure = f64::from(display.exposure);
+                self.measurer.put(Measured { document, picture, samples, exposure, linear });
+            }
+            while !last && busy() && !stale() {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            if last || stale() {
                 return Ok(());
             }
             step = (step * 2).min(8);
         }
     }
 
-    fn set_materials(&mut self, request: &SceneRequest) -> Result<(), String> {
-        let Some((context, renderer)) = &mut self.renderer else { return Ok(()) };
+    /// Hands the renderer what has changed.
+    fn prepare(&mut self, request: &SceneRequest) -> Result<(), Stop> {
+        let key = &request.key;
+        let context = match &self.context {
+            Some(context) => context.clone(),
+            None => self.context.insert(Context::open(AdapterChoice::Any)?).clone(),
+        };
+        if self.renderer.is_none() {
+            self.renderer = Some(Renderer::new(&context, key.size)?);
+        }
+        self.set_materials(&context, request)?;
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
+        let last = self.last.take();
+        let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
+        if changed(&|l| l.shape == key.shape) {
+            renderer.set_geometry(&key.shape.geometry().map_err(Stop::Error)?)?;
+        }
+        if changed(&|l| l.size == key.size) {
+            renderer.resize(key.size)?;
+        }
+        if changed(&|l| l.orbit == key.orbit) {
+            let orbit = key.orbit;
+            let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
+            renderer.set_camera(camera.zoomed(orbit.zoom))?;
+        }
+        // A point light turns with the eye.
+        let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
+        if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
+            renderer.set_light(light(key, &request.environment))?;
+        }
+        if renderer.samples() == 0 || changed(&|l| l.exposure == key.exposure) {
+            self.picture += 1;
+        }
+        self.last = Some(key.clone());
+        Ok(())
+    }
+
+    fn set_materials(&mut self, context: &Context, request: &SceneRequest) -> Result<(), Stop> {
+        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let key = &request.key;
         let known = self.materials.as_ref();
         let same_truth = known
@@ -243,22 +303,18 @@ impl Scene {
         if same {
             return Ok(());
         }
-        let say = |error: gpbrdf_render::Error| error.to_string();
         let precision = Precision::Half;
         let truth = match (&request.truth, self.materials.take()) {
             (None, _) => None,
             (Some(_), Some(Materials { truth: Some(truth), .. })) if same_truth => Some(truth),
-            (Some(table), _) => {
-                Some((key.document, BrdfTexture::upload(context, table, None, precision).map_err(say)?))
-            }
+            (Some(table), _) => Some((key.document, BrdfTexture::upload(context, table, None, precision)?)),
         };
         let sigma = request
             .sigma
             .as_ref()
             .and_then(|table| SigmaTable::from_planes(vec![table.values().iter().map(|v| v[0]).collect()]));
-        let prediction =
-            BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision).map_err(say)?;
-        renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction).map_err(say)?;
+        let prediction = BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision)?;
+        renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction)?;
         self.materials = Some(Materials { truth, prediction: (key.version, key.has_sigma, prediction) });
         Ok(())
     }

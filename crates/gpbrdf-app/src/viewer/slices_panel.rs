@@ -10,7 +10,7 @@ use super::app::Viewer;
 use super::curves::band_at;
 use super::document::Document;
 use super::slices::{Channel, colour};
-use super::widgets::{Number, narrow, segments_ui, short};
+use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui, tools_menu_ui};
 
 /// Titles of the four views.
 const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
@@ -24,6 +24,9 @@ const AXES: egui::Vec2 = egui::vec2(72.0, 40.0);
 
 /// Height of a view's title and the gap below it.
 const TITLE: f32 = 28.0;
+
+/// From this width on all tools stand in one row.
+const WIDE: f32 = 780.0;
 
 /// In how many columns views are largest.
 fn columns(views: usize, area: egui::Vec2) -> usize {
@@ -46,39 +49,7 @@ const REGIONS: [(&str, f64, f64); 4] = [
 impl Viewer {
     /// The four slices and their controls.
     pub(crate) fn slices_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            let look = &mut self.settings.slices;
-            ui.label(RichText::new("Slices").strong().size(15.0));
-            ui.add_space(6.0);
-            let slider = |ui: &mut Ui, number: Number<'_>, width: f32, value: &mut f64| {
-                ui.label(number.label);
-                ui.scope(|ui| {
-                    ui.set_max_width(width);
-                    number.slider_ui(ui, value)
-                });
-            };
-            let mut number =
-                Number::new("φd", 0.0..=180.0, 90.0, "Azimuth of the light about the half vector");
-            number.suffix = "°";
-            slider(ui, number, 210.0, &mut look.phi_d);
-            let number = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
-            slider(ui, number, 150.0, &mut look.exposure);
-            let number =
-                Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
-            slider(ui, number, 130.0, &mut look.gamma);
-            ui.separator();
-            ui.scope(|ui| segments_ui(ui, &mut look.channel, &Channel::ALL, Channel::name));
-            ui.separator();
-            ui.menu_button("Show", |ui| {
-                ui.checkbox(&mut look.square_theta_h, "Square θh")
-                    .on_hover_text("The table's own warp: more room for the specular peak");
-                ui.checkbox(&mut look.chroma, "Chroma")
-                    .on_hover_text("Colours divided by their largest channel");
-                ui.checkbox(&mut self.settings.show_samples, "Samples")
-                    .on_hover_text("Where it was measured");
-                ui.checkbox(&mut self.settings.show_regions, "Regions").on_hover_text("Names of the regions");
-            });
-        });
+        self.slice_tools_ui(ui);
         let Some(document) = self.document() else { return };
         let Some(shown) = self.slices.as_ref().filter(|s| s.key.document == document.id) else {
             ui.centered_and_justified(|ui| {
@@ -99,7 +70,7 @@ impl Viewer {
             ((total - gap * (parts - 1.0)) / parts).max(80.0)
         };
         let size = egui::vec2(share(area.x, columns), share(area.y, rows));
-        let mut hovered = None;
+        let (mut hovered, mut reset) = (None, false);
         for row in views.chunks(columns) {
             ui.horizontal_top(|ui| {
                 ui.spacing_mut().item_spacing.x = gap;
@@ -116,8 +87,9 @@ impl Viewer {
                                 ui.set_max_width(side + AXES.x - 14.0);
                                 title_ui(ui, i, shown.limits[i]);
                             });
-                            let point = self.slice_ui(ui, document, i, texture.id());
+                            let (point, home) = self.slice_ui(ui, document, i, texture.id());
                             hovered = hovered.or(point);
+                            reset |= home;
                         });
                     });
                 }
@@ -126,10 +98,52 @@ impl Viewer {
         if let Some(angles) = hovered {
             hover_ui(ui, document, angles);
         }
+        self.reset_next |= reset;
+    }
+
+    fn slice_tools_ui(&mut self, ui: &mut Ui) {
+        let look = &mut self.settings.slices;
+        let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
+        let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
+        let wide = ui.available_width() > WIDE;
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("Slices").strong().size(15.0));
+            ui.add_space(6.0);
+            let help = "Azimuth of the light about the half vector";
+            let mut number = Number::new("φd", 0.0..=180.0, 90.0, help);
+            number.suffix = "°";
+            tool_ui(ui, number, 220.0, &mut look.phi_d);
+            if wide {
+                tool_ui(ui, exposure.clone(), 205.0, &mut look.exposure);
+                tool_ui(ui, gamma.clone(), 185.0, &mut look.gamma);
+            }
+            segments_ui(ui, &mut look.channel, &Channel::ALL, Channel::name);
+            ui.add_space(6.0);
+            tools_menu_ui(ui, "Show", |ui| {
+                ui.checkbox(&mut look.square_theta_h, "Square θh")
+                    .on_hover_text("The table's own warp: more room for the specular peak");
+                ui.checkbox(&mut look.chroma, "Chroma")
+                    .on_hover_text("Colours divided by their largest channel");
+                ui.checkbox(&mut self.settings.show_samples, "Samples")
+                    .on_hover_text("Where it was measured");
+                ui.checkbox(&mut self.settings.show_regions, "Regions").on_hover_text("Names of the regions");
+                if !wide {
+                    ui.set_min_width(280.0);
+                    exposure.row_ui(ui, &mut look.exposure);
+                    gamma.row_ui(ui, &mut look.gamma);
+                }
+            });
+        });
     }
 
     /// One view; the angles under the pointer.
-    fn slice_ui(&self, ui: &mut Ui, document: &Document, i: usize, texture: TextureId) -> Option<HalfDiff> {
+    fn slice_ui(
+        &self,
+        ui: &mut Ui,
+        document: &Document,
+        i: usize,
+        texture: TextureId,
+    ) -> (Option<HalfDiff>, bool) {
         let square = self.settings.slices.square_theta_h;
         let phi_d = self.settings.slices.phi_d.to_radians();
         let room = ui.available_size();
@@ -193,16 +207,18 @@ impl Viewer {
             zoom(plot);
             plot.pointer_coordinate().filter(|_| plot.response().hovered())
         });
+        focus_ui(ui, &response.response);
         let name = format!("{} slice", TITLES[i]);
         response
             .response
             .widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name));
-        let at = response.inner?;
+        let home = home(ui, &response.response);
+        let Some(at) = response.inner else { return (None, home) };
         let x = at.x / 90.0;
         let theta_h = if square { x * x.abs() } else { x } * FRAC_PI_2;
         let theta_d = at.y / 90.0 * FRAC_PI_2;
         let inside = (0.0..=FRAC_PI_2).contains(&theta_h) && (0.0..=FRAC_PI_2).contains(&theta_d);
-        inside.then_some(HalfDiff { theta_h, theta_d, phi_d })
+        (inside.then_some(HalfDiff { theta_h, theta_d, phi_d }), home)
     }
 }
 
@@ -220,6 +236,20 @@ pub(crate) fn zoom(plot: &mut PlotUi<'_>) {
     if (factor - 1.0).abs() > 1e-6 {
         plot.zoom_bounds_around_hovered(egui::Vec2::splat(factor));
     }
+    let keys = ViewKeys::of(&ctx, &response);
+    if keys.right != 0.0 || keys.up != 0.0 {
+        let bounds = plot.plot_bounds();
+        let step = [0.1 * keys.right * bounds.width(), 0.1 * keys.up * bounds.height()];
+        plot.translate_bounds(egui::Vec2::from(step.map(narrow)));
+    }
+    if keys.zoom != 1.0 {
+        plot.zoom_bounds(egui::Vec2::splat(narrow(keys.zoom)), plot.plot_bounds().center());
+    }
+}
+
+/// Whether a view that has the focus is to be reset.
+pub(crate) fn home(ui: &Ui, response: &egui::Response) -> bool {
+    ViewKeys::of(ui.ctx(), response).reset
 }
 
 /// Where degrees of theta_h stand on an axis with the table's warp.

@@ -5,15 +5,15 @@ use gpbrdf_core::Colormap;
 
 use super::app::{ShownSpheres, Viewer};
 use super::dialogs::Purpose;
-use super::scene::{LIMIT, Orbit, Shape};
+use super::scene::{Orbit, Shape};
 use super::settings::SphereShown;
 use super::slices_panel::scale_ui;
 use super::spheres::SphereLight;
-use super::widgets::{Number, narrow, reset, segments_ui, short};
+use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tools_menu_ui};
 
 /// What the views are called, with what the mouse does in them.
-const SPHERE_HELP: &str = "Sphere view: drag turns the light";
-const OBJECT_HELP: &str = "Object view: drag orbits";
+const SPHERE_HELP: &str = "Sphere view: drag or arrow keys turn the light";
+const OBJECT_HELP: &str = "Object view: drag or arrow keys orbit";
 
 impl Viewer {
     /// The sphere and its controls.
@@ -22,8 +22,8 @@ impl Viewer {
             ui.label(RichText::new("3-D").strong().size(15.0));
             ui.add_space(6.0);
             segments_ui(ui, &mut self.settings.sphere, &SphereShown::ALL, SphereShown::name);
-            ui.menu_button("Shape", |ui| self.shape_ui(ui));
-            ui.menu_button("Light", |ui| self.light_ui(ui));
+            tools_menu_ui(ui, "Shape", |ui| self.shape_ui(ui));
+            tools_menu_ui(ui, "Light", |ui| self.light_ui(ui));
         });
         let Some(id) = self.document().map(|d| d.id) else { return };
         let area = ui.available_rect_before_wrap();
@@ -58,7 +58,6 @@ impl Viewer {
                 let line = egui::lerp(disc.left()..=disc.right(), self.settings.swipe);
                 part(ui, truth, disc, [disc.left(), line], picture);
                 part(ui, &shown.mean, disc, [line, disc.right()], picture);
-                rim_ui(ui, disc, picture, truth.size()[0]);
                 let stroke = egui::Stroke::new(1.5, text.gamma_multiply(0.8));
                 let (upper, lower) = (disc.top().max(picture.top()), disc.bottom().min(picture.bottom()));
                 if picture.x_range().contains(line) {
@@ -98,9 +97,32 @@ impl Viewer {
         footer_ui(ui, area, shown, mode);
         self.sphere_drag(ui, &response, disc);
         self.zoom_drag(ui, &response);
+        focus_ui(ui, &response);
+        let keys = ViewKeys::of(ui.ctx(), &response);
+        let light = &mut self.settings.light;
+        if light.point {
+            let [x, y] = [light.at[0] + 0.05 * keys.right, light.at[1] + 0.05 * keys.up];
+            let scale = x.hypot(y).max(1.0);
+            light.at = [x / scale, y / scale];
+        } else {
+            light.yaw += 0.1 * keys.right;
+            light.pitch -= 0.1 * keys.up;
+        }
+        self.view_keys(&keys);
     }
 
-    fn sphere_drag(&mut self, ui: &Ui, response: &egui::Response, disc: Rect) {
+    /// What keys do in both views.
+    pub(crate) fn view_keys(&mut self, keys: &ViewKeys) {
+        let orbit = &mut self.settings.orbit;
+        orbit.zoom = (orbit.zoom * narrow(keys.zoom)).clamp(0.3, 6.0);
+        if keys.reset {
+            let point = self.settings.light.point;
+            self.settings.light = SphereLight { point, ..SphereLight::default() };
+            (self.settings.orbit, self.settings.swipe) = (Orbit::default(), 0.5);
+        }
+    }
+
+    pub(crate) fn sphere_drag(&mut self, ui: &Ui, response: &egui::Response, disc: Rect) {
         let light = &mut self.settings.light;
         if response.double_clicked() {
             *light = SphereLight { point: light.point, ..SphereLight::default() };
@@ -123,20 +145,16 @@ impl Viewer {
     }
 
     fn shape_ui(&mut self, ui: &mut Ui) {
-        let device = self.has_device();
         let mut shapes = vec![Shape::Sphere, Shape::Knot, Shape::RoundedBox];
         if let Shape::File(_) = &self.settings.shape {
             shapes.push(self.settings.shape.clone());
         }
         for shape in shapes {
-            let (chosen, possible) = (self.settings.shape == shape, device || shape == Shape::Sphere);
-            let radio = egui::RadioButton::new(chosen, shape.name());
-            let response = ui.add_enabled(possible, radio).on_disabled_hover_text("Needs a graphics device");
-            if response.clicked() {
+            if ui.radio(self.settings.shape == shape, shape.name()).clicked() {
                 self.settings.shape = shape;
             }
         }
-        if ui.add_enabled(device, egui::Button::new("OBJ file…")).clicked() {
+        if ui.button("OBJ file…").clicked() {
             self.ask_where(Purpose::Object, "");
             ui.close();
         }
@@ -166,75 +184,8 @@ impl Viewer {
         row("Zoom", 0.3..=6.0, fallback.zoom, "How large it is", &mut orbit.zoom);
     }
 
-    /// An object on the device: left drag orbits, right drag and wheel zoom, Ctrl + drag turns the light.
-    fn object_ui(&mut self, ui: &mut Ui, response: &egui::Response, area: Rect) {
-        let picture = area.shrink(6.0);
-        let scale = ui.pixels_per_point().min(1.25);
-        self.scene_size = [picture.width(), picture.height()].map(|x| pixels(x * scale));
-        let Some(id) = self.document().map(|d| d.id) else { return };
-        if let Some(scene) = self.scene.as_ref().filter(|s| s.document == id) {
-            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            ui.painter().image(scene.texture, picture, uv, Color32::WHITE);
-            let truth = self.document().is_some_and(|d| d.truth.is_some());
-            let split = matches!(self.settings.sphere, SphereShown::Swipe | SphereShown::SideBySide) && truth;
-            let font = egui::FontId::proportional(13.0);
-            let label = |x: f32, align: egui::Align2, text: &str| {
-                let at = pos2(x, picture.top() + 6.0);
-                ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
-                ui.painter().text(at, align, text, font.clone(), Color32::WHITE);
-            };
-            if split {
-                let x = egui::lerp(picture.left()..=picture.right(), self.settings.swipe);
-                let stroke = egui::Stroke::new(1.5, Color32::from_white_alpha(200));
-                ui.painter().line_segment([pos2(x, picture.top()), pos2(x, picture.bottom())], stroke);
-                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, "Truth");
-                label(picture.right() - 8.0, egui::Align2::RIGHT_TOP, "Prediction");
-            } else if truth && self.settings.sphere == SphereShown::Difference {
-                let text = format!("1 - prediction / truth, -{LIMIT} to +{LIMIT}");
-                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, &text);
-            } else if self.settings.sphere == SphereShown::Sigma {
-                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, &format!("Sigma, 0 to {LIMIT}"));
-            } else {
-                label(picture.left() + 8.0, egui::Align2::LEFT_TOP, "Prediction");
-            }
-            let foot = match scene.quality {
-                Some((psnr, ssim)) => {
-                    format!("PSNR {psnr:.1} dB   SSIM {ssim:.4}   {} samples", scene.samples)
-                }
-                None => format!("{} samples", scene.samples),
-            };
-            let at = picture.left_bottom() + vec2(8.0, -6.0);
-            ui.painter().text(
-                at + vec2(1.0, 1.0),
-                egui::Align2::LEFT_BOTTOM,
-                &foot,
-                font.clone(),
-                Color32::BLACK,
-            );
-            ui.painter().text(at, egui::Align2::LEFT_BOTTOM, &foot, font.clone(), Color32::WHITE);
-        } else {
-            ui.put(area, egui::Spinner::new().size(28.0));
-        }
-        self.orbit_drag(ui, response, picture);
-    }
-
-    fn orbit_drag(&mut self, ui: &Ui, response: &egui::Response, picture: Rect) {
-        let modifiers = ui.input(|i| i.modifiers);
-        if response.double_clicked() {
-            self.settings.orbit = Orbit::default();
-            self.settings.swipe = 0.5;
-        } else if modifiers.command || modifiers.shift {
-            self.sphere_drag(ui, response, if modifiers.shift { picture } else { square(picture) });
-        } else if response.dragged_by(egui::PointerButton::Primary) {
-            let orbit = &mut self.settings.orbit;
-            orbit.azimuth -= response.drag_delta().x * 0.008;
-            orbit.elevation = (orbit.elevation + response.drag_delta().y * 0.008).clamp(-1.5, 1.5);
-        }
-        self.zoom_drag(ui, response);
-    }
-
     /// Wheel and right drag zoom.
-    fn zoom_drag(&mut self, ui: &Ui, response: &egui::Response) {
+    pub(crate) fn zoom_drag(&mut self, ui: &Ui, response: &egui::Response) {
         let mut factor = 1.0;
         if response.hovered() {
             factor *= (0.004 * ui.input(|i| i.smooth_scroll_delta().y)).exp();
@@ -293,18 +244,10 @@ impl Viewer {
             self.ask_where(Purpose::Environment, "");
             ui.close();
         }
-        let studio = ui.button("Built-in studio");
-        if studio.clicked() && !reset(ui, &studio) {
-            let map = std::sync::Arc::new(gpbrdf_core::Environment::studio());
-            self.environment = (self.environment.0 + 1, "Studio (built in)".to_owned(), map);
+        if ui.button("Built-in studio").clicked() {
+            self.use_studio();
         }
     }
-}
-
-/// Whole pixels, few enough for any device.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-fn pixels(x: f32) -> u32 {
-    x.round().clamp(16.0, 1600.0) as u32
 }
 
 /// What can be shown without a truth.
@@ -313,7 +256,7 @@ fn only(mode: SphereShown) -> SphereShown {
 }
 
 /// The largest square in the middle of a rectangle.
-fn square(rect: Rect) -> Rect {
+pub(crate) fn square(rect: Rect) -> Rect {
     Rect::from_center_size(rect.center(), egui::Vec2::splat(rect.size().min_elem().max(1.0)))
 }
 
@@ -331,15 +274,11 @@ fn part(ui: &Ui, texture: &TextureHandle, rect: Rect, [left, right]: [f32; 2], c
 /// A whole picture of a sphere, within `clip`.
 fn whole(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
     part(ui, texture, rect, [rect.left(), rect.right()], clip);
-    rim_ui(ui, rect, clip, texture.size()[0]);
 }
 
-/// Hides the steps of a sphere's last one and a half pixels, of `pixels` across, under a smooth ring of the background.
-fn rim_ui(ui: &Ui, disc: Rect, clip: Rect, pixels: usize) {
-    let radius = 0.5 * disc.width();
-    let stroke =
-        egui::Stroke::new(6.0 * radius / narrow(pixels.max(1) as f64), ui.visuals().extreme_bg_color);
-    ui.painter().with_clip_rect(clip).circle_stroke(disc.center(), radius, stroke);
+/// A peak signal-to-noise ratio for people.
+pub(crate) fn psnr_text(psnr: f64) -> String {
+    if psnr.is_finite() { format!("PSNR {psnr:.1} dB") } else { "PSNR ∞ dB".to_owned() }
 }
 
 fn footer_ui(ui: &mut Ui, area: Rect, shown: &ShownSpheres, mode: SphereShown) {
@@ -361,7 +300,7 @@ fn footer_ui(ui: &mut Ui, area: Rect, shown: &ShownSpheres, mode: SphereShown) {
                 ui.add_space(12.0);
             }
             if let (Some(psnr), Some(ssim)) = (images.psnr, images.ssim) {
-                ui.label(RichText::new(format!("PSNR {:.1} dB", psnr)).strong());
+                ui.label(RichText::new(psnr_text(psnr)).strong());
                 ui.label(format!("SSIM {ssim:.4}"));
             }
             if !images.fine {

@@ -230,19 +230,24 @@ fn sigma_sphere(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) ->
     Some((disc(&image, |i| colour(Colormap::Sequential, values[i] / limit)), limit))
 }
 
-/// A sphere picture with a soft rim.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 255")]
+/// A sphere picture with a soft rim: its last pixels, few of which have their middle on the sphere, are like those
+/// before them.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels, and a share of 255")]
 fn disc(image: &Image, colour: impl Fn(usize) -> Color32) -> ColorImage {
     let (width, height) = (image.width(), image.height());
+    let inside = 1.0 - 5.0 / width as f64;
     let pixels = (0..width * height)
         .map(|i| {
-            if !image.mask()[i] {
-                return Color32::TRANSPARENT;
-            }
             let x = 2.0 * ((i % width) as f64 + 0.5) / width as f64 - 1.0;
             let y = 2.0 * ((i / width) as f64 + 0.5) / height as f64 - 1.0;
-            let coverage = (0.5 + (1.0 - x.hypot(y)) * 0.5 * width as f64).clamp(0.0, 1.0);
-            let [r, g, b, _] = colour(i).to_array();
+            let radius = x.hypot(y);
+            let coverage = (0.5 + (1.0 - radius) * 0.5 * width as f64).clamp(0.0, 1.0);
+            if coverage == 0.0 {
+                return Color32::TRANSPARENT;
+            }
+            let scale = (inside / radius).min(1.0);
+            let at = |x: f64, n: usize| ((0.5 + 0.5 * scale * x) * n as f64) as usize;
+            let [r, g, b, _] = colour(at(y, height) * width + at(x, width)).to_array();
             Color32::from_rgba_unmultiplied(r, g, b, (255.0 * coverage) as u8)
         })
         .collect();

@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use eframe::egui::{self, ComboBox, Response, RichText, Slider, Ui};
+use eframe::egui::containers::menu::{MenuButton, MenuConfig};
+use eframe::egui::{self, ComboBox, Key, Response, RichText, Slider, Ui};
 
 /// Width of the labels of a form.
 const LABEL_WIDTH: f32 = 104.0;
@@ -67,6 +68,48 @@ pub(crate) fn reset(ui: &Ui, response: &Response) -> bool {
     over && ui.input(|i| i.modifiers.command && (i.pointer.primary_down() || i.pointer.primary_clicked()))
 }
 
+/// What keys ask of a view that has the focus: arrows, plus and minus, Home.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ViewKeys {
+    /// Presses.
+    pub(crate) right: f64,
+    pub(crate) up: f64,
+    /// A factor.
+    pub(crate) zoom: f64,
+    pub(crate) reset: bool,
+}
+
+impl ViewKeys {
+    /// Reads the keys.
+    pub(crate) fn of(ctx: &egui::Context, response: &Response) -> Self {
+        if !response.has_focus() {
+            return Self { right: 0.0, up: 0.0, zoom: 1.0, reset: false };
+        }
+        let filter =
+            egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
+        ctx.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+        ctx.input(|input| {
+            let presses =
+                |key: Key| if input.modifiers.command { 0.0 } else { input.num_presses(key) as f64 };
+            let larger = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
+            Self {
+                right: presses(Key::ArrowRight) - presses(Key::ArrowLeft),
+                up: presses(Key::ArrowUp) - presses(Key::ArrowDown),
+                zoom: 1.15f64.powf(larger),
+                reset: input.key_pressed(Key::Home),
+            }
+        })
+    }
+}
+
+/// Shows that a view has the focus.
+pub(crate) fn focus_ui(ui: &Ui, response: &Response) {
+    if response.has_focus() {
+        let stroke = ui.visuals().selection.stroke;
+        ui.painter().rect_stroke(response.rect, 4.0, stroke, egui::StrokeKind::Inside);
+    }
+}
+
 /// A row of a form: a label and what stands beside it, whose inputs the label names.
 pub(crate) fn row_ui<R>(ui: &mut Ui, label: &str, content: impl FnOnce(&mut Ui) -> R) -> R {
     ui.horizontal(|ui| {
@@ -95,7 +138,7 @@ pub(crate) fn choice_ui<T: Copy + PartialEq>(
     let before = *value;
     row_ui(ui, label, |ui| {
         let width = ui.available_width() - 8.0;
-        let combo = ComboBox::from_id_salt(label).width(width).selected_text(name(*value));
+        let combo = ComboBox::from_id_salt(label).width(width).truncate().selected_text(name(*value));
         let shown = combo.show_ui(ui, |ui| {
             for &option in all {
                 ui.selectable_value(value, option, name(option));
@@ -106,6 +149,23 @@ pub(crate) fn choice_ui<T: Copy + PartialEq>(
     *value != before
 }
 
+/// A slider with its label among the tools over a view, `width` wide together.
+pub(crate) fn tool_ui(ui: &mut Ui, number: Number<'_>, width: f32, value: &mut f64) -> bool {
+    let size = egui::vec2(width, ui.spacing().interact_size.y);
+    let layout = egui::Layout::left_to_right(egui::Align::Center);
+    ui.allocate_ui_with_layout(size, layout, |ui| {
+        ui.label(number.label);
+        number.slider_ui(ui, value)
+    })
+    .inner
+}
+
+/// A menu of tools, which stays open while they are used.
+pub(crate) fn tools_menu_ui(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui)) {
+    let config = MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new(name).config(config).ui(ui, content);
+}
+
 /// Buttons of which one is down; whether another is now.
 pub(crate) fn segments_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
@@ -114,10 +174,11 @@ pub(crate) fn segments_ui<T: Copy + PartialEq>(
     name: impl Fn(T) -> &'static str,
 ) -> bool {
     let before = *value;
-    ui.spacing_mut().item_spacing.x = 2.0;
+    let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.x, 2.0);
     for &option in all {
         ui.selectable_value(value, option, name(option));
     }
+    ui.spacing_mut().item_spacing.x = gap;
     *value != before
 }
 

@@ -1,0 +1,215 @@
+//! Objects lit by the device, and what becomes of them when it is lost.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use eframe::egui::{self, Key};
+use eframe::egui_wgpu::RendererOptions;
+use eframe::wgpu::PollType;
+use egui_kittest::kittest::Queryable;
+use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
+use gpbrdf_app::viewer::Viewer;
+use gpbrdf_render::{AdapterChoice, Context};
+
+use super::driver::{Driver, crop};
+
+const SIZE: [f32; 2] = [760.0, 460.0];
+
+/// A window on an object of a material with few samples, so that the prediction is not the truth.
+fn object(settings: &str) -> Driver {
+    let mut driver =
+        Driver::set(&[PathBuf::from("ward")], SIZE, &format!("{{\"arrangement\": \"Sphere\", {settings}}}"));
+    driver.slide("Samples", 100.0);
+    driver.fitted();
+    driver
+}
+
+/// How many samples the metrics that are shown belong to; none before there are any.
+fn measured_samples(driver: &Driver) -> Option<u32> {
+    let text = driver.after("SSIM ")?;
+    text.split_once(" at ")?.1.split(' ').next()?.parse().ok()
+}
+
+/// The pixels of the object's view, without captions and metrics.
+fn view(driver: &mut Driver) -> image::RgbaImage {
+    let rect = driver.harness.get_by_label_contains("Object view").rect().shrink(40.0);
+    crop(&driver.picture(), rect)
+}
+
+fn mean_gap<'a>(pairs: impl Iterator<Item = (&'a image::Rgba<u8>, &'a image::Rgba<u8>)>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (a, b) in pairs {
+        sum += (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0;
+        count += 1.0;
+    }
+    sum / count
+}
+
+#[test]
+fn metrics_follow_the_picture_from_its_first_samples_on() {
+    let mut driver = object("\"shape\": \"Knot\"");
+    driver.wait("metrics", |d| measured_samples(d).is_some());
+    let first = measured_samples(&driver).unwrap();
+    assert!(first < 64, "the first metrics are those of {first} samples");
+    let psnr =
+        |d: &Driver| -> f64 { d.after("PSNR ").unwrap().strip_suffix(" dB").unwrap().parse().unwrap() };
+    assert!((10.0..80.0).contains(&psnr(&driver)), "{}", psnr(&driver));
+    driver.wait("more samples", |d| measured_samples(d).is_some_and(|n| n > first));
+    driver.wait("a smooth picture", |d| measured_samples(d) >= Some(192));
+    let last = psnr(&driver);
+    let text = driver.after("SSIM ").unwrap();
+    let ssim: f64 = text.split(' ').next().unwrap().parse().unwrap();
+    assert!((10.0..80.0).contains(&last) && (0.3..1.0).contains(&ssim), "{last} {ssim}");
+    // A better model is closer.
+    driver.slide("Samples", 30_000.0);
+    driver.fitted();
+    driver.wait("a closer picture", |d| psnr(d) > last + 3.0);
+}
+
+#[test]
+fn side_by_side_shows_two_whole_objects_and_a_swipe_one() {
+    let mut driver = object("\"shape\": \"Knot\", \"sphere\": \"SideBySide\"");
+    driver.wait("a picture", |d| measured_samples(d) >= Some(16));
+    let halves = |driver: &mut Driver| {
+        let rect = driver.harness.get_by_label_contains("Object view").rect().shrink(6.0);
+        let picture = driver.picture();
+        let half = egui::vec2((0.5 * rect.width()).floor() - 2.0, rect.height() - 70.0);
+        let left = rect.min + egui::vec2(0.0, 30.0);
+        let right = left + egui::vec2(half.x + 4.0, 0.0);
+        [left, right].map(|at| crop(&picture, egui::Rect::from_min_size(at, half)))
+    };
+    let [truth, prediction] = halves(&mut driver);
+    // The same object from the same side, but not the same material.
+    let gap = mean_gap(std::iter::zip(truth.pixels(), prediction.pixels()));
+    assert!(gap > 0.05 && gap < 12.0, "{gap}");
+    let flat = mean_gap(truth.pixels().map(|p| (p, truth.get_pixel(0, 0))));
+    assert!(flat > 10.0, "there is no object: {flat}");
+    driver.harness.get_by_label("Swipe").click();
+    let start = Instant::now();
+    loop {
+        driver.harness.run_steps(3);
+        let [left, right] = halves(&mut driver);
+        if mean_gap(std::iter::zip(left.pixels(), right.pixels())) > 15.0 {
+            break;
+        }
+        assert!(start.elapsed().as_secs() < 60, "a swipe shows halves of one object");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn difference_and_sigma_and_turning_change_the_picture() {
+    let mut driver = object("\"shape\": \"RoundedBox\"");
+    driver.wait("a picture", |d| measured_samples(d) >= Some(1));
+    let mut before = view(&mut driver);
+    for what in ["Difference", "Sigma"] {
+        driver.harness.get_by_label(what).click();
+        driver.harness.run_steps(3);
+        let mut now = view(&mut driver);
+        let start = Instant::now();
+        while mean_gap(std::iter::zip(before.pixels(), now.pixels())) < 5.0 {
+            assert!(start.elapsed().as_secs() < 60, "{what} looks like what was before it");
+            std::thread::sleep(Duration::from_millis(20));
+            driver.harness.run_steps(1);
+            now = view(&mut driver);
+        }
+        assert!(driver.shows("0.1"), "{what} has no scale");
+        before = now;
+    }
+    // Keys orbit.
+    driver.harness.get_by_label_contains("Object view").focus();
+    driver.harness.run_steps(3);
+    for _ in 0..4 {
+        driver.press(Key::ArrowRight);
+    }
+    driver.click("Shape");
+    assert!((driver.value("Azimuth") - 0.1).abs() < 1e-3, "{}", driver.value("Azimuth"));
+}
+
+#[test]
+fn object_files_and_maps_are_read_and_broken_ones_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(
+        path("corner.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n",
+    )
+    .unwrap();
+    std::fs::write(path("broken.obj"), "v 0 0\nf 1 2 9\n").unwrap();
+    std::fs::write(path("broken.hdr"), "#?RADIANCE\nnothing").unwrap();
+    let mut map = std::io::Cursor::new(Vec::new());
+    gpbrdf_core::write_image_exr(&mut map, 16, 8, &[[0.4, 0.5, 0.6]; 128]).unwrap();
+    std::fs::write(path("sky.exr"), map.into_inner()).unwrap();
+    let mut driver = object("\"shape\": \"Knot\"");
+    driver.wait("a picture", |d| measured_samples(d) >= Some(1));
+    let load = |driver: &mut Driver, menu: &str, item: &str, name: &str| {
+        driver.click(menu);
+        driver.click(item);
+        driver.give_path(&path(name), "Load");
+    };
+    load(&mut driver, "Shape", "OBJ file…", "corner.obj");
+    driver.wait("the object", |d| measured_samples(d) >= Some(8));
+    load(&mut driver, "Light", "Environment map…", "sky.exr");
+    driver.click("Light");
+    driver.wait("the map", |d| d.harness.query_by_label("Environment: sky.exr").is_some());
+    driver.press(Key::Escape);
+    load(&mut driver, "Light", "Environment map…", "broken.hdr");
+    driver.wait("a message", |d| d.shows("broken.hdr\": expected"));
+    driver.click("Dismiss");
+    load(&mut driver, "Shape", "OBJ file…", "broken.obj");
+    driver.wait("a message", |d| d.shows("broken.obj"));
+    // The sphere is shown in its place, and objects are to be had again.
+    driver.wait("a sphere", |d| d.harness.query_by_label_contains("Sphere view").is_some());
+    driver.click("Shape");
+    driver.harness.get_by_label("Knot").click();
+    driver.press(Key::Escape);
+    driver.wait("a knot", |d| d.harness.query_by_label_contains("Object view").is_some());
+    driver.wait("its metrics", |d| measured_samples(d) >= Some(1));
+    assert!(driver.shows("broken.obj") && driver.harness.query_by_label("Show ward").is_some());
+}
+
+#[test]
+fn a_lost_device_is_reported_and_opened_anew() {
+    let context = Context::open(AdapterChoice::Any).unwrap();
+    let theirs = context.clone();
+    let mut driver = Driver::around(SIZE, move |ctx| {
+        let settings = serde_json::from_str("{\"arrangement\": \"Sphere\", \"shape\": \"Knot\"}").unwrap();
+        let mut viewer = Viewer::new(ctx, settings, &[PathBuf::from("ward")]).unwrap();
+        viewer.use_device(theirs).unwrap();
+        viewer
+    });
+    driver.slide("Samples", 100.0);
+    driver.fitted();
+    driver.wait("metrics", |d| measured_samples(d).is_some());
+    context.device().destroy();
+    driver.wait("a message", |d| d.shows("is lost"));
+    assert!(driver.shows(&format!("the graphics device \"{}\" is lost", context.info().name)));
+    // The object is lit on another device, and nothing else is lost.
+    driver.wait("a smooth picture", |d| measured_samples(d) >= Some(192));
+    assert!(driver.harness.query_by_label_contains("Object view").is_some());
+    assert!(driver.harness.query_by_label("Show ward").is_some() && driver.shows("is lost"));
+    driver.click("Dismiss");
+    assert!(!driver.shows("is lost"));
+}
+
+#[test]
+fn a_window_whose_device_is_lost_goes_on_in_another_one() {
+    let mut driver = object("\"shape\": \"Knot\"");
+    let state = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
+    driver.viewer().watch_device(&state);
+    state.device.destroy();
+    let _told = state.device.poll(PollType::Poll);
+    driver.wait("the loss", |d| d.viewer().has_lost_device());
+    let old = driver.harness.state_mut().take().unwrap();
+    let mut driver = Driver::around(SIZE, move |ctx| Viewer::reopened(ctx, old).unwrap());
+    driver.wait("metrics", |d| measured_samples(d).is_some());
+    let name = state.adapter.get_info().name;
+    assert!(driver.shows(&format!("the window's graphics device \"{name}\" was lost")));
+    assert!(!driver.viewer().has_lost_device());
+    assert!(driver.harness.query_by_label("Show ward").is_some());
+    assert!(driver.value("Samples") < 200.0, "{}", driver.value("Samples"));
+    driver.slide("Samples", 400.0);
+    driver.fitted();
+    driver.click("Dismiss");
+    assert!(!driver.shows("was lost"));
+}
