@@ -156,6 +156,38 @@ fn figures_show_their_curves_and_pictures() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_keeps_what_is_done_and_goes_on_from_there() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let cli = Cli::new();
+    // Minutes of dense fits after table 1.
+    let options = ["reproduce", "--quick", "--only", "table1,table2", "--budget", "30", "-o", "out"];
+    let mut child = cli.command(&options).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let begin = Instant::now();
+    while !cli.path("out/table1.json").exists() {
+        assert!(begin.elapsed() < Duration::from_secs(240) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let names = cli.names("out");
+    assert!(
+        names.iter().all(|name| name.starts_with("table1.") || name.starts_with("figure1-")),
+        "{names:?}"
+    );
+    // The same command takes table 1 from there and begins table 2.
+    let child = cli.command(&options).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(String::from_utf8(output.stdout).unwrap().starts_with("table1: taken from"));
+    assert_eq!(cli.names("out"), names);
+}
+
 #[test]
 fn bad_options_are_refused_before_any_work() {
     let cli = Cli::new();

@@ -1,6 +1,7 @@
 //! Inputs and outputs named on the command line.
 
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Result, bail};
 use gpbrdf_core::{Environment, Source, materials};
@@ -41,6 +42,22 @@ pub(crate) struct OutputFolder {
     created: Vec<PathBuf>,
 }
 
+/// Folders that were created and may still be empty.
+static CREATED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn created_folders() -> MutexGuard<'static, Vec<PathBuf>> {
+    CREATED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the folders that were created for outputs and hold none yet, for a handler of Ctrl-C. None can be created as long as
+/// the answer is held.
+pub(crate) fn remove_empty_folders() -> MutexGuard<'static, Vec<PathBuf>> {
+    let mut created = created_folders();
+    // Fails, as it should, for folders that hold something.
+    created.drain(..).for_each(|p| drop(std::fs::remove_dir(p)));
+    created
+}
+
 impl OutputFolder {
     /// Refuses, before the work that leads up to it, a path that can be no folder.
     pub(crate) fn check(path: &Path) -> Result<()> {
@@ -57,6 +74,7 @@ impl OutputFolder {
     }
 
     pub(crate) fn create(path: &Path) -> Result<Self> {
+        let mut all = created_folders();
         let mut created: Vec<PathBuf> = path
             .ancestors()
             .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
@@ -69,6 +87,7 @@ impl OutputFolder {
             );
         }
         created.retain(|p| p.exists());
+        all.extend(created.iter().cloned());
         Ok(Self { path: path.to_owned(), created })
     }
 
@@ -79,7 +98,26 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
+        let mut all = created_folders();
+        all.retain(|p| !self.created.contains(p));
         // Fails, as it should, for folders that hold something.
         self.created.iter().for_each(|p| drop(std::fs::remove_dir(p)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interruption_removes_folders_that_hold_nothing() {
+        let base = tempfile::tempdir().unwrap();
+        let (empty, full) = (base.path().join("a/b"), base.path().join("c"));
+        let folders = [OutputFolder::create(&empty).unwrap(), OutputFolder::create(&full).unwrap()];
+        std::fs::write(folders[1].join("kept"), "x").unwrap();
+        drop(remove_empty_folders());
+        assert!(!base.path().join("a").exists() && full.join("kept").is_file());
+        drop(folders);
+        assert!(full.join("kept").is_file());
     }
 }

@@ -71,9 +71,9 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    // Ctrl-C: no partial file stays behind.
+    // Ctrl-C: no partial file stays behind, nor an empty folder.
     let handler = ctrlc::set_handler(|| {
-        let _held = gpbrdf_core::remove_pending();
+        let _held = (gpbrdf_core::remove_pending(), input::remove_empty_folders());
         std::process::exit(130);
     });
     if let Err(error) = handler {

@@ -88,25 +88,22 @@ impl Viewer {
     }
 
     pub(crate) fn help_window_ui(&mut self, ctx: &Context) {
-        egui::Window::new("Shortcuts").open(&mut self.windows.help).collapsible(false).vscroll(true).show(
-            ctx,
-            |ui| {
-                egui::Grid::new("shortcuts").num_columns(2).spacing([24.0, 5.0]).striped(true).show(
-                    ui,
-                    |ui| {
-                        for (_, shortcut, what) in &SHORTCUTS {
-                            ui.label(RichText::new(ctx.format_shortcut(shortcut)).strong());
-                            ui.label(*what);
-                            ui.end_row();
-                        }
-                        for (how, what) in MOUSE {
-                            ui.label(RichText::new(how).strong());
-                            ui.label(what);
-                            ui.end_row();
-                        }
-                    },
-                );
-            },
-        );
+        // All of it where there is room.
+        let height = 0.9 * ctx.content_rect().height();
+        let window = egui::Window::new("Shortcuts").open(&mut self.windows.help);
+        window.collapsible(false).vscroll(true).default_height(height).show(ctx, |ui| {
+            egui::Grid::new("shortcuts").num_columns(2).spacing([24.0, 5.0]).striped(true).show(ui, |ui| {
+                for (_, shortcut, what) in &SHORTCUTS {
+                    ui.label(RichText::new(ctx.format_shortcut(shortcut)).strong());
+                    ui.label(*what);
+                    ui.end_row();
+                }
+                for (how, what) in MOUSE {
+                    ui.label(RichText::new(how).strong());
+                    ui.label(what);
+                    ui.end_row();
+                }
+            });
+        });
     }
 }
