@@ -116,11 +116,14 @@ fn beyond_the_paper_stand_the_rival_and_the_curve_of_samples() {
     command.extend(options.map(std::ffi::OsStr::new));
     cli.ok(&command);
     let rivals = rows(&cli, "beyond", 0);
-    let [neural, ours] = &rivals[..] else { panic!("{rivals:?}") };
+    let [neural, ours, lattice] = &rivals[..] else { panic!("{rivals:?}") };
     assert_eq!((&neural["floats"], &neural["PSNR env"].as_f64().unwrap().round()), (&675.into(), &39.0));
     assert!(ours["floats"].as_u64().unwrap() <= 675);
     close(&ours["PSNR env"], 52.6, 1.5);
     close(&ours["median ln"], 0.0137, 0.002);
+    assert_eq!(lattice["model"], "lattice of 198 measurements");
+    assert!(lattice["floats"].as_u64().unwrap() <= 675);
+    close(&lattice["PSNR env"], 42.7, 2.0);
     let curve = rows(&cli, "beyond", 1);
     let counts: Vec<u64> = curve.iter().map(|r| r["samples"].as_u64().unwrap()).collect();
     assert_eq!(counts, [20, 165, 1000, 36_864]);

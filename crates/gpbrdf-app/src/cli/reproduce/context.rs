@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail};
 use gpbrdf_core::{
     BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, NeuralBrdf, Provenance,
-    SampleSet, Source, bake_mean, bake_sigma, dense_cost, detect_symmetry, fit,
+    SampleSet, Source, Symmetry, bake_mean, bake_sigma, dense_cost, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
@@ -103,8 +103,19 @@ impl<'a> Material<'a> {
     /// # Errors
     /// A source of scattered samples, or a count out of range.
     pub(super) fn lattice_samples(&self, count: usize) -> Result<SampleSet> {
+        self.measure(|symmetry| Ok(LatticeLayout::with_samples(count, symmetry)?))
+    }
+
+    /// Asks the source itself on a lattice that relies on the symmetry it has.
+    ///
+    /// # Errors
+    /// A source of scattered samples, or a broken lattice.
+    pub(super) fn measure(
+        &self,
+        layout: impl FnOnce(Symmetry) -> Result<LatticeLayout>,
+    ) -> Result<SampleSet> {
         let brdf = self.source.brdf().with_context(|| self.shapeless())?;
-        let lattice = LatticeLayout::with_samples(count, detect_symmetry(brdf))?;
+        let lattice = layout(detect_symmetry(brdf))?;
         Ok(SampleSet::measure(brdf, &Layout::Lattice(lattice))?)
     }
 
