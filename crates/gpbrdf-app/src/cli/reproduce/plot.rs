@@ -2,8 +2,8 @@
 
 use anyhow::{Result, anyhow};
 use plotters::prelude::{
-    BLACK, ChartBuilder, Circle, IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor, SVGBackend,
-    SeriesLabelPosition, WHITE,
+    ChartBuilder, Circle, Cross, IntoDrawingArea, IntoFont, LineSeries, PathElement, RGBColor, SVGBackend,
+    Text, TriangleMarker, WHITE,
 };
 use plotters::style::Color;
 
@@ -28,9 +28,17 @@ impl Axis<'_> {
         if self.logarithmic { x.log10() } else { x }
     }
 
+    /// A number at a mark; two digits are enough between the marks of a logarithmic scale.
     fn label(&self, at: f64) -> String {
-        let x = if self.logarithmic { 10f64.powf(at) } else { at };
-        let digits = significant(if x.abs() < 1e-12 { 0.0 } else { x });
+        if self.logarithmic {
+            let x = 10f64.powf(at);
+            if !(1e-4..1e5).contains(&x) {
+                return format!("{x:.0e}");
+            }
+            let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
+            return format!("{rounded}");
+        }
+        let digits = significant(if at.abs() < 1e-12 { 0.0 } else { at });
         if digits.contains('.') && !digits.contains('e') {
             digits.trim_end_matches('0').trim_end_matches('.').to_owned()
         } else {
@@ -51,9 +59,13 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(110, 110, 110),
 ];
 
-const SIZE: (u32, u32) = (860, 540);
+const SIZE: (u32, u32) = (1080, 540);
+/// Width of the legend, to the right of the frame.
+const LEGEND: i32 = 230;
+/// Height of a line of the legend.
+const LINE: i32 = 22;
 
-/// The curves in one frame with a legend. Points that a scale cannot show are left out.
+/// The curves in one frame, with a legend beside it. Points that a scale cannot show are left out.
 ///
 /// # Errors
 /// Those of the drawing backend.
@@ -80,6 +92,7 @@ pub(super) fn curves(title: &str, x: Axis<'_>, y: Axis<'_>, curves: &[Curve]) ->
     {
         let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
         area.fill(&WHITE).map_err(|e| failed(&e))?;
+        let (area, legend) = area.split_horizontally(SIZE.0.cast_signed() - LEGEND);
         let mut chart = ChartBuilder::on(&area)
             .caption(title, ("sans-serif", 22).into_font())
             .margin(14)
@@ -99,24 +112,34 @@ pub(super) fn curves(title: &str, x: Axis<'_>, y: Axis<'_>, curves: &[Curve]) ->
             .map_err(|e| failed(&e))?;
         for (i, (curve, points)) in curves.iter().zip(&placed).enumerate() {
             let colour = COLOURS[i % COLOURS.len()];
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)))
-                .map_err(|e| failed(&e))?
-                .label(&curve.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
-            if points.len() <= 40 {
-                let dots = points.iter().map(|&p| Circle::new(p, 3, colour.filled()));
-                chart.draw_series(dots).map_err(|e| failed(&e))?;
+            let line = LineSeries::new(points.iter().copied(), colour.stroke_width(2));
+            chart.draw_series(line).map_err(|e| failed(&e))?;
+            let y = 60 + LINE * i32::try_from(i).unwrap_or(0);
+            let sample = PathElement::new([(4, y), (30, y)], colour.stroke_width(2));
+            legend.draw(&sample).map_err(|e| failed(&e))?;
+            let name = Text::new(curve.name.clone(), (38, y - 7), ("sans-serif", 14).into_font());
+            legend.draw(&name).map_err(|e| failed(&e))?;
+            if points.len() > 40 {
+                continue;
             }
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .background_style(WHITE.mix(0.8))
-            .border_style(BLACK.mix(0.4))
-            .label_font(("sans-serif", 14))
-            .draw()
+            // The points change their shape once colours begin again.
+            let (at, points) = ((17, y), points.iter().copied());
+            match i / COLOURS.len() % 3 {
+                0 => chart
+                    .draw_series(points.map(|p| Circle::new(p, 3, colour.filled())))
+                    .map(drop)
+                    .and_then(|()| legend.draw(&Circle::new(at, 3, colour.filled()))),
+                1 => chart
+                    .draw_series(points.map(|p| TriangleMarker::new(p, 5, colour.filled())))
+                    .map(drop)
+                    .and_then(|()| legend.draw(&TriangleMarker::new(at, 5, colour.filled()))),
+                _ => chart
+                    .draw_series(points.map(|p| Cross::new(p, 4, colour.stroke_width(2))))
+                    .map(drop)
+                    .and_then(|()| legend.draw(&Cross::new(at, 4, colour.stroke_width(2)))),
+            }
             .map_err(|e| failed(&e))?;
+        }
         area.present().map_err(|e| failed(&e))?;
     }
     Ok(svg)
@@ -135,7 +158,11 @@ mod tests {
         for text in ["A title", "samples", "error", "a curve", "<circle", "polyline"] {
             assert!(svg.contains(text), "{text}: {svg}");
         }
-        assert_eq!(svg.matches("<circle").count(), 2, "a logarithm of zero is left out");
+        // Two points, as a logarithm of zero is left out, and one in the legend.
+        assert_eq!(svg.matches("<circle").count(), 3);
+        for text in [">1<", ">10<", ">0.1<", ">0.01<"] {
+            assert!(svg.split_whitespace().collect::<String>().contains(text), "{text}: {svg}");
+        }
         for points in [&[][..], &[(f64::NAN, 1.0)], &[(2.0, 2.0)]] {
             let svg = curves("t", axis("x", false), axis("y", false), &[curve(points)]).unwrap();
             assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
