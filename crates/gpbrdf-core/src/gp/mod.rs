@@ -4,6 +4,7 @@ mod cost;
 mod dense;
 mod dense_fit;
 mod factor;
+mod heavy_tails;
 pub(crate) mod inducing;
 mod inducing_fit;
 mod kronecker;
