@@ -66,9 +66,7 @@ impl<T> Sender<T> {
         self.mailbox.generation.fetch_add(1, Ordering::Relaxed);
         self.mailbox.filled.notify_one();
     }
-}
 
-impl<T> Sender<T> {
     fn close(&self) {
         let mut slot = self.mailbox.slot.lock().unwrap_or_else(PoisonError::into_inner);
         slot.closed = true;

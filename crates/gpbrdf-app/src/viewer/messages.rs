@@ -1,6 +1,14 @@
 //! What the user has to read: messages stay until they are dismissed.
 
+use std::path::Path;
+
 use eframe::egui::{self, Color32, Frame, RichText, Ui};
+
+/// What is wrong with a file, with its name.
+pub(crate) fn naming(path: &Path, error: &dyn std::fmt::Display) -> String {
+    let (text, name) = (error.to_string(), path.display().to_string());
+    if text.contains(&name) { text } else { format!("\"{name}\": {text}") }
+}
 
 /// Messages, the oldest first.
 #[derive(Debug, Default)]

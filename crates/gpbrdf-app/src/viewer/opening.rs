@@ -9,6 +9,7 @@ use gpbrdf_core::{Environment, Source, materials};
 use super::app::Viewer;
 use super::document::{Document, DocumentId};
 use super::fitter::Event;
+use super::messages::naming;
 use super::session::{SavedDocument, Session};
 use super::settings::Settings;
 
@@ -38,11 +39,7 @@ impl Viewer {
         let (outbox, path) = (self.outbox.clone(), path.to_owned());
         let name = path.display().to_string();
         let work = move || {
-            let named = |e: gpbrdf_core::Error| {
-                let (text, name) = (e.to_string(), path.display().to_string());
-                if text.contains(&name) { text } else { format!("\"{name}\": {text}") }
-            };
-            let result = Source::open(&path).map(Box::new).map_err(named);
+            let result = Source::open(&path).map(Box::new).map_err(|error| naming(&path, &error));
             outbox.send(Event::Opened { result, restore });
         };
         if let Err(error) = std::thread::Builder::new().name("reader".into()).spawn(work) {

@@ -3,7 +3,7 @@
 //! The device is not the window's: what the window waits for would wait for the lighting too, and a window that changes
 //! its size wants its device to be idle.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use super::document::DocumentId;
 use super::fitter::{Event, Outbox};
 use super::mailbox::{Mailbox, Sender};
+use super::messages::naming;
 use super::quality::{Measured, Measurer};
 use super::settings::SphereShown;
 use super::spheres::SphereLight;
@@ -53,16 +54,9 @@ impl Shape {
             Self::Sphere => Geometry::Sphere,
             Self::Knot => Geometry::Mesh(Mesh::knot()),
             Self::RoundedBox => Geometry::Mesh(Mesh::rounded_box()),
-            Self::File(path) => Geometry::Mesh(read(path)?),
+            Self::File(path) => Geometry::Mesh(read_obj(path).map_err(|error| naming(path, &error))?),
         })
     }
-}
-
-fn read(path: &Path) -> Result<Mesh, String> {
-    read_obj(path).map_err(|error| {
-        let (text, name) = (error.to_string(), path.display().to_string());
-        if text.contains(&name) { text } else { format!("\"{name}\": {text}") }
-    })
 }
 
 /// From where the object is seen.

@@ -115,13 +115,9 @@ impl Search<'_> {
 
     /// Renews the weights by what the candidates leave; their own residuals are void after it.
     fn renew_weights(&mut self, candidates: &[Candidate]) -> Result<()> {
-        let mut squares = vec![0.0; self.data.weights.len()];
-        for candidate in candidates {
-            let values = self.regress(candidate)?.values;
-            let lattice = candidate.lattice(self.symmetry, self.kernel);
-            add_squares(&lattice, &values, self.data, candidate.component, &mut squares)?;
-        }
-        self.weights = heavy_tailed_weights(&self.data.weights, &self.data.shown, &squares);
+        let lattices: Vec<InducingShape> =
+            candidates.iter().map(|candidate| candidate.lattice(self.symmetry, self.kernel)).collect();
+        self.weights = renewed(&self.weights, &lattices, self.data)?;
         Ok(())
     }
 
@@ -342,14 +338,19 @@ pub(crate) fn fit_inducing(
 fn renewed_weights(lattices: &[InducingShape], data: &GridData) -> Result<Vec<f64>> {
     let mut weights = data.weights.clone();
     for _ in 0..WEIGHT_STEPS {
-        let mut squares = vec![0.0; weights.len()];
-        for (component, lattice) in lattices.iter().enumerate() {
-            let values = regress_on(lattice, data, &weights, component, REGRESSION_RATIO)?.values;
-            add_squares(lattice, &values, data, component, &mut squares)?;
-        }
-        weights = heavy_tailed_weights(&data.weights, &data.shown, &squares);
+        weights = renewed(&weights, lattices, data)?;
     }
     Ok(weights)
+}
+
+/// The grid's weights by what the values that `weights` lead to leave, on one lattice a component.
+fn renewed(weights: &[f64], lattices: &[InducingShape], data: &GridData) -> Result<Vec<f64>> {
+    let mut squares = vec![0.0; weights.len()];
+    for (component, lattice) in lattices.iter().enumerate() {
+        let values = regress_on(lattice, data, weights, component, REGRESSION_RATIO)?.values;
+        add_squares(lattice, &values, data, component, &mut squares)?;
+    }
+    Ok(heavy_tailed_weights(&data.weights, &data.shown, &squares))
 }
 
 /// Grows the lattices until no side more fits into `nodes` nodes in all.
