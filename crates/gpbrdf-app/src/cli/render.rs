@@ -66,7 +66,7 @@ pub(crate) struct Render {
     /// Tone curve.
     #[arg(long, value_enum, default_value = "filmic")]
     tone: ToneName,
-    /// What the picture shows; the difference is 1 - prediction / truth.
+    /// What the picture shows; the difference is prediction - truth in exposed linear light, red where too bright.
     #[arg(long, value_enum, default_value = "prediction")]
     show: ShowName,
     /// What is behind the object.
@@ -355,7 +355,7 @@ impl Render {
                 ShowName::Truth => colour(&linear.truth),
                 ShowName::Prediction => colour(&linear.prediction),
                 ShowName::Sigma => grey(&linear.sigma),
-                ShowName::Difference => grey(&linear.difference()),
+                ShowName::Difference => grey(&linear.difference(1.0)),
             };
             return Ok(write_image_exr(file, linear.width, linear.height, &pixels)?);
         }
@@ -380,7 +380,7 @@ impl Render {
                 .map(|show| self.panel(show, renderer, linear, display))
                 .into_iter()
                 .collect::<Result<Vec<_>>>()?;
-            let note = "difference: 1 - prediction / truth, means of R, G, B";
+            let note = "difference: prediction - truth, linear, mean of R, G, B; 1 = white";
             return Ok(panel_figure(title, &panels, note).write_png(file)?);
         }
         match self.show {
@@ -389,7 +389,7 @@ impl Render {
                 let note = if self.show == ShowName::Sigma {
                     "weighted by reflected light"
                 } else {
-                    "1 - prediction / truth, means of R, G, B"
+                    "prediction - truth, linear, mean of R, G, B; 1 = white"
                 };
                 Ok(panel_figure(title, &[panel], note).write_png(file)?)
             }
@@ -427,12 +427,12 @@ impl Render {
                 ("sigma", Show::Sigma, Some(Scale { map: Colormap::Sequential, low: 0.0, high }))
             }
             ShowName::Difference => {
-                let high = limit_of(linear.difference());
+                let high = limit_of(linear.difference(display.exposure));
                 ("difference", Show::Difference, Some(Scale { map: Colormap::Diverging, low: -high, high }))
             }
         };
         #[expect(clippy::cast_possible_truncation, reason = "single precision is the shader's")]
-        let limit = scale.map_or(display.limit, |scale| scale.high as f32);
+        let limit = scale.map(|scale| scale.high as f32);
         let pixels = renderer.read_display(&Display { show: mode, limit, ..display })?;
         Ok(Panel { picture: picture(linear, &pixels), caption, scale })
     }
