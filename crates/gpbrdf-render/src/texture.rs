@@ -1,6 +1,7 @@
 //! A BRDF as a 3-D texture.
 
-use gpbrdf_core::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SigmaTable, cell_index};
+use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
 
 use crate::context::Context;
@@ -198,7 +199,8 @@ impl BrdfTexture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gpbrdf_core::{Brdf as _, HalfDiff, direction};
+    use gpbrdf_core::brdf::direction;
+    use gpbrdf_core::{Brdf as _, HalfDiff};
 
     crate::support::gpu_tests![
         textures_come_back_as_they_were_sent,
