@@ -1,5 +1,10 @@
 //! The program: what is open, what is selected, and what the threads have sent.
 
+mod actions;
+mod inbox;
+mod opening;
+mod requests;
+
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, OnceLock};
@@ -9,20 +14,20 @@ use anyhow::Result;
 use eframe::egui::{self, Context, TextureHandle, Ui};
 use gpbrdf_core::Environment;
 
-use super::curves::{Albedo, AlbedoRequest};
-use super::dialogs::Purpose;
-use super::document::{Document, DocumentId, Work};
-use super::fitter::{Event, Fitter, Outbox};
-use super::mailbox::Sender;
-use super::messages::Messages;
-use super::plots_panel::PlotCache;
-use super::quality::Quality;
-use super::scene::{SceneKey, SceneRequest};
-use super::settings::Settings;
-use super::shortcuts;
-use super::slices::{SliceKey, SliceRequest};
-use super::spheres::{SphereKey, SphereRequest};
-use super::{curves, scene, slices, spheres};
+use crate::viewer::state::document::{Document, DocumentId, Work};
+use crate::viewer::state::messages::Messages;
+use crate::viewer::state::settings::Settings;
+use crate::viewer::ui::panes::plots::PlotCache;
+use crate::viewer::ui::shortcuts;
+use crate::viewer::work::curves::{Albedo, AlbedoRequest};
+use crate::viewer::work::dialogs::Purpose;
+use crate::viewer::work::fitter::{Event, Fitter, Outbox};
+use crate::viewer::work::mailbox::Sender;
+use crate::viewer::work::quality::Quality;
+use crate::viewer::work::scene::{SceneKey, SceneRequest};
+use crate::viewer::work::slices::{SliceKey, SliceRequest};
+use crate::viewer::work::spheres::{SphereKey, SphereRequest};
+use crate::viewer::work::{curves, scene, slices, spheres};
 
 /// Slices as textures.
 pub(crate) struct ShownSlices {
@@ -306,7 +311,7 @@ impl Viewer {
         self.receive(&ctx);
         // A frame may be laid out twice; files are dropped once.
         if ctx.current_pass_index() == 0 {
-            let dropped = ctx.input(|i| super::dropped_paths(&i.raw));
+            let dropped = ctx.input(|i| crate::viewer::dropped_paths(&i.raw));
             self.open_paths(&dropped);
         }
         for action in shortcuts::pressed(&ctx) {

@@ -4,37 +4,11 @@
 //! takes longer than a frame runs on threads: `fitter` samples, fits and bakes, `slices`, `curves` and `spheres` make
 //! pictures. Each takes the newest request and gives up older ones; results come back as events.
 
-mod actions;
 mod app;
-mod curves;
-mod dialogs;
-mod document;
-mod export;
-mod fitter;
-mod inbox;
-mod layout;
-mod mailbox;
-mod materials_panel;
-mod menu;
-mod messages;
-mod model_panel;
-mod object_panel;
-mod opening;
-mod plots_panel;
-mod quality;
-mod requests;
-mod scene;
-mod session;
-mod settings;
-mod shortcuts;
-mod slices;
-mod slices_panel;
 mod spec;
-mod sphere_panel;
-mod spheres;
-mod status;
-mod widgets;
-mod windows;
+mod state;
+mod ui;
+mod work;
 
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -46,7 +20,7 @@ use clap::Parser;
 use eframe::egui;
 
 pub use app::{FrameTimes, Viewer};
-pub use settings::Settings;
+pub use state::settings::Settings;
 
 /// See a measured material, its Gaussian-process prediction and the error, and change the model live.
 #[derive(Debug, Parser)]

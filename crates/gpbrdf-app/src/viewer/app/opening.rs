@@ -6,12 +6,12 @@ use std::sync::Arc;
 use eframe::egui;
 use gpbrdf_core::{Environment, Source, materials};
 
-use super::app::Viewer;
-use super::document::{Document, DocumentId};
-use super::fitter::Event;
-use super::messages::naming;
-use super::session::{SavedDocument, Session};
-use super::settings::Settings;
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::state::messages::naming;
+use crate::viewer::state::session::{SavedDocument, Session};
+use crate::viewer::state::settings::Settings;
+use crate::viewer::work::fitter::Event;
 
 impl Viewer {
     /// Opens files and sessions; they are read off this thread.

@@ -7,10 +7,10 @@ use gpbrdf_core::{Brdf, BrdfTable, Content, HalfDiff, Rgb, Transform, Trilinear,
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::document::{Document, DocumentId};
-use super::fitter::{Event, Outbox};
-use super::mailbox::{Mailbox, Sender};
-use super::slices::Channel;
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::work::fitter::{Event, Outbox};
+use crate::viewer::work::mailbox::{Mailbox, Sender};
+use crate::viewer::work::slices::Channel;
 
 /// What is plotted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]

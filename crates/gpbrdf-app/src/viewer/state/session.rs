@@ -6,9 +6,9 @@ use anyhow::{Context, Result, bail};
 use gpbrdf_core::AtomicFile;
 use serde::{Deserialize, Serialize};
 
-use super::document::Document;
-use super::settings::Settings;
-use super::spec::ModelSpec;
+use crate::viewer::spec::ModelSpec;
+use crate::viewer::state::document::Document;
+use crate::viewer::state::settings::Settings;
 
 /// What a session file says that it is.
 const FORMAT: &str = "gpbrdf session";
@@ -79,7 +79,7 @@ impl Session {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::viewer::document::DocumentId;
+    use crate::viewer::state::document::DocumentId;
     use gpbrdf_core::Source;
 
     #[test]

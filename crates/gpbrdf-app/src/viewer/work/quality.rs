@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use gpbrdf_core::{psnr, ssim};
 use gpbrdf_render::LinearPicture;
 
-use super::document::DocumentId;
-use super::fitter::{Event, Outbox};
-use super::mailbox::{Mailbox, Sender};
+use crate::viewer::state::document::DocumentId;
+use crate::viewer::work::fitter::{Event, Outbox};
+use crate::viewer::work::mailbox::{Mailbox, Sender};
 
 /// Pictures to compare.
 #[derive(Debug)]

@@ -3,13 +3,13 @@
 use eframe::egui::{self, Color32, Rect, RichText, Sense, TextureHandle, Ui, pos2, vec2};
 use gpbrdf_core::Colormap;
 
-use super::app::{ShownSpheres, Viewer};
-use super::dialogs::Purpose;
-use super::scene::{Orbit, Shape};
-use super::settings::SphereShown;
-use super::slices_panel::scale_ui;
-use super::spheres::SphereLight;
-use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tools_menu_ui};
+use crate::viewer::app::{ShownSpheres, Viewer};
+use crate::viewer::state::settings::SphereShown;
+use crate::viewer::ui::panes::slices::scale_ui;
+use crate::viewer::ui::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tools_menu_ui};
+use crate::viewer::work::dialogs::Purpose;
+use crate::viewer::work::scene::{Orbit, Shape};
+use crate::viewer::work::spheres::SphereLight;
 
 /// What the views are called, with what the mouse does in them.
 const SPHERE_HELP: &str = "Sphere view: drag or arrow keys turn the light";

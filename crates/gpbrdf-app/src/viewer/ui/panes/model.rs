@@ -3,13 +3,13 @@
 use eframe::egui::{self, RichText, Ui};
 use gpbrdf_core::{Hyper, LatticeLayout, MeanFunction, Process, Symmetry};
 
-use super::app::Viewer;
-use super::document::{Document, Work};
-use super::shortcuts::{self, Action};
-use super::spec::{
+use crate::viewer::app::Viewer;
+use crate::viewer::spec::{
     KernelKind, LayoutKind, ModelSpec, SymmetryKind, TransformKind, hyper_parameters, set_hyper_parameter,
 };
-use super::widgets::{Number, choice_ui, reset, row_ui, section_ui, short};
+use crate::viewer::state::document::{Document, Work};
+use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::ui::widgets::{Number, choice_ui, reset, row_ui, section_ui, short};
 
 /// The most samples of a lattice and off it.
 const MAX_LATTICE: f64 = 200_000.0;

@@ -3,12 +3,12 @@
 use eframe::egui::{self, Align2, Color32, Rect, RichText, Ui, pos2, vec2};
 use gpbrdf_core::Colormap;
 
-use super::app::{ShownScene, Viewer};
-use super::scene::{LIMIT, Orbit};
-use super::settings::SphereShown;
-use super::slices_panel::scale_ui;
-use super::sphere_panel::{psnr_text, square};
-use super::widgets::{ViewKeys, focus_ui, narrow, short};
+use crate::viewer::app::{ShownScene, Viewer};
+use crate::viewer::state::settings::SphereShown;
+use crate::viewer::ui::panes::slices::scale_ui;
+use crate::viewer::ui::panes::three_d::sphere::{psnr_text, square};
+use crate::viewer::ui::widgets::{ViewKeys, focus_ui, narrow, short};
+use crate::viewer::work::scene::{LIMIT, Orbit};
 
 /// Between two pictures side by side.
 const GAP: f32 = 4.0;

@@ -3,12 +3,12 @@
 use eframe::egui::{self, Color32, RichText, Ui};
 use egui_plot::{FilledArea, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
 
-use super::app::Viewer;
-use super::curves::{ALBEDO_ANGLES, CurveKind, CurveLook, CurvePoint, curve, samples_near};
-use super::document::DocumentId;
-use super::slices::Channel;
-use super::slices_panel::{home, zoom};
-use super::widgets::{Number, focus_ui, segments_ui, short, tool_ui};
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::DocumentId;
+use crate::viewer::ui::panes::slices::{home, zoom};
+use crate::viewer::ui::widgets::{Number, focus_ui, segments_ui, short, tool_ui};
+use crate::viewer::work::curves::{ALBEDO_ANGLES, CurveKind, CurveLook, CurvePoint, curve, samples_near};
+use crate::viewer::work::slices::Channel;
 
 /// What a curve was made from.
 type Key = (DocumentId, u64, bool, bool, CurveLook);

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::curves::CurveLook;
-use super::scene::{Orbit, Shape};
-use super::slices::SliceLook;
-use super::spheres::SphereLight;
+use crate::viewer::work::curves::CurveLook;
+use crate::viewer::work::scene::{Orbit, Shape};
+use crate::viewer::work::slices::SliceLook;
+use crate::viewer::work::spheres::SphereLight;
 
 /// Files kept in the list of recent ones.
 const MAX_RECENT: usize = 12;

@@ -6,9 +6,9 @@ use eframe::egui::{Color32, ColorImage};
 use gpbrdf_core::{BrdfTable, Colormap, Rgb, Slice, SliceOptions, Source};
 use serde::{Deserialize, Serialize};
 
-use super::document::DocumentId;
-use super::fitter::{Event, Outbox};
-use super::mailbox::{Mailbox, Sender};
+use crate::viewer::state::document::DocumentId;
+use crate::viewer::work::fitter::{Event, Outbox};
+use crate::viewer::work::mailbox::{Mailbox, Sender};
 
 /// Rows and columns of a slice.
 pub(crate) const SLICE_SIZE: usize = 256;

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use eframe::egui::{self, Context, RichText, Ui};
 use gpbrdf_core::materials;
 
-use super::app::Viewer;
-use super::dialogs::Purpose;
-use super::shortcuts::{MOUSE, SHORTCUTS};
+use crate::viewer::app::Viewer;
+use crate::viewer::ui::shortcuts::{MOUSE, SHORTCUTS};
+use crate::viewer::work::dialogs::Purpose;
 
 impl Viewer {
     pub(crate) fn open_window_ui(&mut self, ctx: &Context) {

@@ -2,10 +2,10 @@
 
 use eframe::egui::{self, CentralPanel, Frame, Panel, RichText, Ui, Vec2};
 
-use super::app::Viewer;
-use super::settings::Arrangement;
-use super::shortcuts::{self, Action};
-use super::widgets::segments_ui;
+use crate::viewer::app::Viewer;
+use crate::viewer::state::settings::Arrangement;
+use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::ui::widgets::segments_ui;
 
 /// Room that all views need at once, and that one needs.
 const ROOMY: Vec2 = egui::vec2(840.0, 560.0);

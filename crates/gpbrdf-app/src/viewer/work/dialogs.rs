@@ -1,6 +1,6 @@
 //! The system's file dialogs, off the window's thread.
 
-use super::fitter::{Event, Outbox};
+use crate::viewer::work::fitter::{Event, Outbox};
 
 /// What a chosen file is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, Context};
 
-use super::app::{Viewer, Windows};
-use super::dialogs::{self, Purpose};
-use super::document::Work;
-use super::export;
-use super::scene::Shape;
-use super::session::Session;
-use super::settings::Arrangement;
-use super::shortcuts::Action;
+use crate::viewer::app::{Viewer, Windows};
+use crate::viewer::state::document::Work;
+use crate::viewer::state::session::Session;
+use crate::viewer::state::settings::Arrangement;
+use crate::viewer::ui::shortcuts::Action;
+use crate::viewer::work::dialogs::{self, Purpose};
+use crate::viewer::work::export;
+use crate::viewer::work::scene::Shape;
 
 impl Viewer {
     /// Does what a key or a menu asks for.

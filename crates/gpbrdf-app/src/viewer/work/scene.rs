@@ -16,14 +16,14 @@ use gpbrdf_render::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::document::DocumentId;
-use super::fitter::{Event, Outbox};
-use super::mailbox::{Mailbox, Sender};
-use super::messages::naming;
-use super::quality::{Measured, Measurer};
-use super::settings::SphereShown;
-use super::spheres::SphereLight;
-use super::widgets::narrow;
+use crate::viewer::state::document::DocumentId;
+use crate::viewer::state::messages::naming;
+use crate::viewer::state::settings::SphereShown;
+use crate::viewer::ui::widgets::narrow;
+use crate::viewer::work::fitter::{Event, Outbox};
+use crate::viewer::work::mailbox::{Mailbox, Sender};
+use crate::viewer::work::quality::{Measured, Measurer};
+use crate::viewer::work::spheres::SphereLight;
 
 /// What is lit.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -10,10 +10,10 @@ use gpbrdf_core::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::document::DocumentId;
-use super::fitter::{Event, Outbox};
-use super::mailbox::{Mailbox, Sender};
-use super::slices::{colour, round_limit, shown};
+use crate::viewer::state::document::DocumentId;
+use crate::viewer::work::fitter::{Event, Outbox};
+use crate::viewer::work::mailbox::{Mailbox, Sender};
+use crate::viewer::work::slices::{colour, round_limit, shown};
 
 /// Pixels along each side, at first and at last.
 const COARSE: usize = 96;

@@ -2,10 +2,10 @@
 
 use eframe::egui::{self, Color32, RichText, Ui};
 
-use super::app::Viewer;
-use super::document::{Document, DocumentId, Work};
-use super::shortcuts::{self, Action};
-use super::widgets::section_ui;
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::{Document, DocumentId, Work};
+use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::ui::widgets::section_ui;
 
 /// What the list asks for.
 enum Wish {

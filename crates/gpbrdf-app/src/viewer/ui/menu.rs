@@ -3,10 +3,10 @@
 use eframe::egui::{self, Ui};
 use gpbrdf_core::materials;
 
-use super::app::Viewer;
-use super::dialogs::Purpose;
-use super::settings::Arrangement;
-use super::shortcuts::{self, Action};
+use crate::viewer::app::Viewer;
+use crate::viewer::state::settings::Arrangement;
+use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::work::dialogs::Purpose;
 
 impl Viewer {
     pub(crate) fn menu_ui(&mut self, ui: &mut Ui) {

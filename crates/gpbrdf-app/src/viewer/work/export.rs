@@ -7,8 +7,8 @@ use anyhow::{Context as _, Result, bail};
 use eframe::egui::Context;
 use gpbrdf_core::{AtomicFile, Brdf, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
 
-use super::app::Viewer;
-use super::fitter::{Event, Outbox};
+use crate::viewer::app::Viewer;
+use crate::viewer::work::fitter::{Event, Outbox};
 
 /// Runs `work` on a thread of its own and says how it went.
 fn in_background(outbox: &Outbox, work: impl FnOnce() -> Result<String> + Send + 'static) {

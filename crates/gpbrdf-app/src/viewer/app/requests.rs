@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use super::app::Viewer;
-use super::curves::{AlbedoRequest, CurveKind};
-use super::document::Work;
-use super::fitter::Request;
-use super::scene::{SceneKey, SceneRequest, Shape};
-use super::settings::Arrangement;
-use super::slices::{SliceKey, SliceRequest, Surface};
-use super::spheres::{SphereKey, SphereRequest};
-use super::widgets::narrow;
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::Work;
+use crate::viewer::state::settings::Arrangement;
+use crate::viewer::ui::widgets::narrow;
+use crate::viewer::work::curves::{AlbedoRequest, CurveKind};
+use crate::viewer::work::fitter::Request;
+use crate::viewer::work::scene::{SceneKey, SceneRequest, Shape};
+use crate::viewer::work::slices::{SliceKey, SliceRequest, Surface};
+use crate::viewer::work::spheres::{SphereKey, SphereRequest};
 
 impl Viewer {
     /// Asks the threads for what has changed.

@@ -12,8 +12,8 @@ use gpbrdf_core::{
     SigmaTable, Source, bake_mean, bake_sigma, condition, fit_per_axis, interval_95,
 };
 
-use super::document::{DocumentId, Fitted};
-use super::spec::{ModelSpec, SampleKey};
+use crate::viewer::spec::{ModelSpec, SampleKey};
+use crate::viewer::state::document::{DocumentId, Fitted};
 
 /// What the threads tell the window.
 #[derive(Debug)]
@@ -33,21 +33,24 @@ pub(crate) enum Event {
     /// A request ended with an error.
     Failed { document: DocumentId, message: String },
     /// A file has been read, or not; with what the session says about it.
-    Opened { result: Result<Box<Source>, String>, restore: Option<Box<super::session::SavedDocument>> },
+    Opened {
+        result: Result<Box<Source>, String>,
+        restore: Option<Box<crate::viewer::state::session::SavedDocument>>,
+    },
     /// A file has been written, or not.
     Saved { result: Result<String, String> },
     /// Paths chosen in a dialog.
-    Chosen { purpose: super::dialogs::Purpose, paths: Vec<std::path::PathBuf> },
+    Chosen { purpose: crate::viewer::work::dialogs::Purpose, paths: Vec<std::path::PathBuf> },
     /// Slices in colour.
-    Slices(Box<super::slices::SliceImages>),
+    Slices(Box<crate::viewer::work::slices::SliceImages>),
     /// Directional albedos.
-    Albedo(Vec<super::curves::Albedo>),
+    Albedo(Vec<crate::viewer::work::curves::Albedo>),
     /// Spheres in colour.
-    Spheres(Box<super::spheres::SphereImages>),
+    Spheres(Box<crate::viewer::work::spheres::SphereImages>),
     /// An object on the device.
-    Scene(Box<super::scene::SceneImage>),
+    Scene(Box<crate::viewer::work::scene::SceneImage>),
     /// How close an object's prediction is.
-    Quality(super::quality::Quality),
+    Quality(crate::viewer::work::quality::Quality),
     /// An object cannot be shown: its file is broken or the device refuses.
     SceneFailed(String),
     /// The device of objects was lost and is opened anew.

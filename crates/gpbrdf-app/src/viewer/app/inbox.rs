@@ -5,11 +5,11 @@ use std::time::Instant;
 use eframe::egui::{self, Context, TextureHandle};
 use gpbrdf_core::Hyper;
 
-use super::app::{ShownScene, ShownSlices, ShownSpheres, Viewer};
-use super::document::Work;
-use super::fitter::Event;
-use super::scene::{SceneImage, Shape};
-use super::{slices, spheres};
+use crate::viewer::app::{ShownScene, ShownSlices, ShownSpheres, Viewer};
+use crate::viewer::state::document::Work;
+use crate::viewer::work::fitter::Event;
+use crate::viewer::work::scene::{SceneImage, Shape};
+use crate::viewer::work::{slices, spheres};
 
 impl Viewer {
     /// Takes in what the threads have sent.
@@ -60,7 +60,8 @@ impl Viewer {
         };
         let Some(document) = self.documents.iter_mut().find(|d| d.id == id) else { return };
         let cancelled = document.work == Work::Cancelled;
-        let current = |version: u64| move |f: &&mut super::document::Fitted| f.version == version;
+        let current =
+            |version: u64| move |f: &&mut crate::viewer::state::document::Fitted| f.version == version;
         match event {
             Event::Stage { stage, evaluations, .. } if !cancelled => {
                 let since = match document.work {

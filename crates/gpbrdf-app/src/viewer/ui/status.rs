@@ -2,9 +2,9 @@
 
 use eframe::egui::{RichText, Ui};
 
-use super::app::Viewer;
-use super::document::Work;
-use super::widgets::short;
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::Work;
+use crate::viewer::ui::widgets::short;
 
 impl Viewer {
     /// What is open, how good it is, how long it took.

@@ -6,11 +6,13 @@ use eframe::egui::{self, Align2, Color32, RichText, TextureId, Ui};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotImage, PlotPoint, PlotUi, Points};
 use gpbrdf_core::{Brdf, Colormap, HalfDiff};
 
-use super::app::Viewer;
-use super::curves::band_at;
-use super::document::Document;
-use super::slices::{Channel, colour};
-use super::widgets::{Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui, tools_menu_ui};
+use crate::viewer::app::Viewer;
+use crate::viewer::state::document::Document;
+use crate::viewer::ui::widgets::{
+    Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui, tools_menu_ui,
+};
+use crate::viewer::work::curves::band_at;
+use crate::viewer::work::slices::{Channel, colour};
 
 /// Titles of the four views.
 const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
@@ -398,7 +400,7 @@ mod tests {
     #[test]
     fn values_of_a_direction_are_read() {
         let source = gpbrdf_core::Source::built_in("lambert").unwrap();
-        let document = Document::new(super::super::document::DocumentId(0), source);
+        let document = Document::new(crate::viewer::state::document::DocumentId(0), source);
         let angles = |theta_h| HalfDiff { theta_h, theta_d: 0.3, phi_d: FRAC_PI_2 };
         let lines = hover_lines(&document, angles(0.2));
         assert!(lines.iter().any(|(name, _)| *name == "truth"), "{lines:?}");

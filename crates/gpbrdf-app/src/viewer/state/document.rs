@@ -8,7 +8,7 @@ use gpbrdf_core::{
     BrdfTable, CellMetrics, Content, FitReport, Hyper, ImageMetrics, Model, SampleSet, Source,
 };
 
-use super::spec::ModelSpec;
+use crate::viewer::spec::ModelSpec;
 
 /// Names a document for as long as the program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

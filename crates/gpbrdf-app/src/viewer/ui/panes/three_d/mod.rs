@@ -1,0 +1,4 @@
+//! Lit spheres and objects.
+
+pub(crate) mod object;
+pub(crate) mod sphere;
