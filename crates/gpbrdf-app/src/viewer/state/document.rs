@@ -1,11 +1,12 @@
-//! An open material: its source, its truth, the model asked for and what has been fitted.
+//! An open material: its source, its truth, the model that is wanted and what has been fitted.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use eframe::egui::Color32;
 use gpbrdf_core::{
-    BrdfTable, CellMetrics, Content, FitReport, Hyper, ImageMetrics, Model, SampleSet, Source,
+    Brdf, BrdfTable, CellMetrics, Content, FitReport, HalfDiff, Hyper, ImageMetrics, Model, Rgb, SampleSet,
+    Source,
 };
 
 use crate::viewer::spec::ModelSpec;
@@ -14,19 +15,19 @@ use crate::viewer::spec::ModelSpec;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) struct DocumentId(pub(crate) u64);
 
-/// What the fitter has found for one request; later stages fill in what is `None`.
+/// What the fitter has found for one request. Later stages fill in what is `None`.
 #[derive(Clone, Debug)]
 pub(crate) struct Fitted {
-    /// Tells this result from all others.
+    /// A number that no other result has.
     pub(crate) version: u64,
     pub(crate) model: Arc<Model>,
     pub(crate) samples: Arc<SampleSet>,
-    /// NaN where it is not known, as for a model from a file.
+    /// NaN where it is unknown, as for a model from a file.
     pub(crate) log_marginal_likelihood: f64,
-    /// How the search went; none where there was none.
+    /// How the search went; `None` for hyper-parameters that were set by hand.
     pub(crate) report: Option<FitReport>,
     pub(crate) mean: Arc<BrdfTable>,
-    /// Standard deviation of the target in every cell.
+    /// Standard deviation of the latent target of each channel in every cell.
     pub(crate) sigma: Option<Arc<BrdfTable>>,
     pub(crate) cells: Option<CellMetrics>,
     pub(crate) images: Option<ImageMetrics>,
@@ -34,18 +35,43 @@ pub(crate) struct Fitted {
     pub(crate) seconds: [f64; 3],
 }
 
-/// Where the work on a document stands.
+/// What the fitter does for a request, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stage {
+    Sampling,
+    Fitting,
+    BakingMean,
+    BakingSigma,
+    Tabulating,
+    Comparing,
+}
+
+impl Stage {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Sampling => "Sampling",
+            Self::Fitting => "Fitting",
+            Self::BakingMean => "Baking the mean",
+            Self::BakingSigma => "Baking sigma",
+            Self::Tabulating => "Tabulating the truth",
+            Self::Comparing => "Comparing",
+        }
+    }
+}
+
+/// The state of the work on a document.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Work {
-    /// Nothing to do.
+    /// There is nothing to do.
     Idle,
-    /// Asked for, not begun.
+    /// A request has been made and the fitter has not begun it.
     Waiting,
-    /// In a stage, since when, after how many evaluations of the likelihood.
-    Running { stage: &'static str, since: Instant, evaluations: usize },
-    /// Given up by the user.
+    /// The fitter is in a stage of the request that began at `since`, after so many evaluations of the
+    /// likelihood.
+    Running { stage: Stage, since: Instant, evaluations: usize },
+    /// The user has cancelled it.
     Cancelled,
-    /// Ended with a message.
+    /// It ended with an error.
     Failed(String),
 }
 
@@ -60,15 +86,16 @@ pub(crate) struct Document {
     /// The source as a table, once there is one.
     pub(crate) truth: Option<Arc<BrdfTable>>,
     pub(crate) spec: ModelSpec,
-    /// What was last asked of the fitter.
-    pub(crate) asked: Option<ModelSpec>,
+    /// The model that was last requested from the fitter.
+    pub(crate) requested: Option<ModelSpec>,
     pub(crate) fitted: Option<Fitted>,
-    /// What the last search found: the defaults of the sliders.
+    /// The hyper-parameters that the last search found: the defaults of the sliders.
     pub(crate) optimum: Option<Hyper>,
     pub(crate) work: Work,
 }
 
-/// Colours for lines that colour-blind readers can tell apart: M. Okabe and K. Ito, "Color Universal Design" (2008).
+/// Colours for lines that colour-blind readers can tell apart: M. Okabe and K. Ito, "Color Universal Design"
+/// (2008).
 const PALETTE: [Color32; 7] = [
     Color32::from_rgb(0xE6, 0x9F, 0x00),
     Color32::from_rgb(0x56, 0xB4, 0xE9),
@@ -91,15 +118,16 @@ impl Document {
             source: Arc::new(source),
             truth: None,
             spec: ModelSpec::default(),
-            asked: None,
+            requested: None,
             fitted: None,
             optimum: None,
             work: Work::Idle,
         }
     }
 
-    /// Whether the source says what the truth is anywhere: scattered samples and models do not.
-    pub(crate) fn has_truth(&self) -> bool {
+    /// Whether the source can be evaluated at any direction, so that predictions can be compared with it:
+    /// scattered samples and models cannot.
+    pub(crate) fn source_is_truth(&self) -> bool {
         matches!(self.source.content, Content::Table(_) | Content::Function(_))
     }
 
@@ -115,5 +143,34 @@ impl Document {
 
     pub(crate) fn is_busy(&self) -> bool {
         matches!(self.work, Work::Waiting | Work::Running { .. })
+    }
+
+    /// Whether the model that is wanted has been fitted, or will not be.
+    pub(crate) fn is_fitted(&self) -> bool {
+        match self.work {
+            Work::Failed(_) | Work::Cancelled => true,
+            Work::Idle => self.fitted.is_some() && self.requested.as_ref() == Some(&self.spec),
+            Work::Waiting | Work::Running { .. } => false,
+        }
+    }
+
+    /// The result of this number, unless a newer one has replaced it.
+    pub(crate) fn result_mut(&mut self, version: u64) -> Option<&mut Fitted> {
+        self.fitted.as_mut().filter(|f| f.version == version)
+    }
+
+    /// The truth at a pair of directions: from its table once there is one, from the source until then.
+    pub(crate) fn truth_at(&self, angles: HalfDiff) -> Option<Rgb> {
+        match &self.truth {
+            Some(table) => Some(table.eval_half_diff(angles)),
+            None if self.source_is_truth() => self.source.brdf().map(|brdf| brdf.eval_half_diff(angles)),
+            None => None,
+        }
+    }
+
+    /// Lets the search find the hyper-parameters again.
+    pub(crate) fn optimise(&mut self) {
+        self.spec.hyper = None;
+        self.requested = None;
     }
 }

@@ -1,89 +1,67 @@
-//! What the user has to read: messages stay until they are dismissed.
+//! Messages for the user: errors stay until they are dismissed.
 
 use std::path::Path;
 
-use eframe::egui::{self, Color32, Frame, RichText, Ui};
-
-/// What is wrong with a file, with its name.
+/// An error about a file as a text that names the file.
 pub(crate) fn naming(path: &Path, error: &dyn std::fmt::Display) -> String {
     let (text, name) = (error.to_string(), path.display().to_string());
     if text.contains(&name) { text } else { format!("\"{name}\": {text}") }
 }
 
+/// One message.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Message {
+    /// Whether it reports a failure, not a success.
+    pub(crate) is_error: bool,
+    pub(crate) text: String,
+}
+
 /// Messages, the oldest first.
 #[derive(Debug, Default)]
 pub(crate) struct Messages {
-    list: Vec<(bool, String)>,
+    list: Vec<Message>,
 }
 
-/// Of more notes than this, the oldest go.
+/// The oldest notes are dropped where there are more than this.
 const NOTES: usize = 3;
-/// Share of the window that messages may take; more of them scroll.
-const SHARE: f32 = 0.3;
 
 impl Messages {
-    /// Says what went wrong.
+    /// Reports a failure.
     pub(crate) fn error(&mut self, message: impl Into<String>) {
         self.push(true, message.into());
     }
 
-    /// Says what has been done.
+    /// Reports a success.
     pub(crate) fn note(&mut self, message: impl Into<String>) {
         self.push(false, message.into());
     }
 
-    fn push(&mut self, error: bool, message: String) {
-        if !self.list.iter().any(|(_, known)| *known == message) {
-            self.list.push((error, message));
+    fn push(&mut self, is_error: bool, text: String) {
+        if !self.list.iter().any(|known| known.text == text) {
+            self.list.push(Message { is_error, text });
         }
         // Notes make room for newer ones; errors stay until they are read.
-        let notes = self.list.iter().filter(|(error, _)| !error).count();
+        let notes = self.list.iter().filter(|m| !m.is_error).count();
         if notes > NOTES
-            && let Some(oldest) = self.list.iter().position(|(error, _)| !error)
+            && let Some(oldest) = self.list.iter().position(|m| !m.is_error)
         {
             self.list.remove(oldest);
         }
     }
 
-    /// The messages, each with a button that dismisses it.
-    pub(crate) fn messages_ui(&mut self, ui: &mut Ui) {
-        if self.list.is_empty() {
-            return;
-        }
-        let mut read = None;
-        let most = SHARE * ui.available_height();
-        egui::Panel::top("messages").show_separator_line(false).show(ui, |ui| {
-            egui::ScrollArea::vertical().max_height(most).auto_shrink([false, true]).show(ui, |ui| {
-                for (i, (error, message)) in self.list.iter().enumerate() {
-                    let (colour, mark) = if *error {
-                        (Color32::from_rgb(0xC8, 0x3C, 0x2E), "Error")
-                    } else {
-                        (Color32::from_rgb(0x2E, 0x7D, 0x52), "Done")
-                    };
-                    Frame::new().fill(colour).corner_radius(4).inner_margin(6).outer_margin(2).show(
-                        ui,
-                        |ui| {
-                            ui.horizontal(|ui| {
-                                ui.label(RichText::new(mark).strong().color(Color32::WHITE));
-                                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                                    if ui.button("Dismiss").clicked() {
-                                        read = Some(i);
-                                    }
-                                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                                        ui.add(
-                                            egui::Label::new(RichText::new(message).color(Color32::WHITE))
-                                                .wrap(),
-                                        );
-                                    });
-                                });
-                            });
-                        },
-                    );
-                }
-            });
-        });
-        if let Some(i) = read {
-            self.list.remove(i);
+    /// The messages, the oldest first.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &Message> {
+        self.list.iter()
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Drops a message that has been read.
+    pub(crate) fn dismiss(&mut self, index: usize) {
+        if index < self.list.len() {
+            self.list.remove(index);
         }
     }
 }
@@ -100,9 +78,9 @@ mod tests {
             messages.note(format!("note {i}"));
         }
         messages.error("error 3");
-        let count = |error: bool| messages.list.iter().filter(|m| m.0 == error).count();
+        let count = |error: bool| messages.list.iter().filter(|m| m.is_error == error).count();
         assert_eq!((count(true), count(false)), (20, NOTES));
-        assert_eq!(messages.list[0].1, "error 0");
-        assert!(messages.list.iter().any(|m| m.1 == "note 19"));
+        assert_eq!(messages.list[0].text, "error 0");
+        assert!(messages.list.iter().any(|m| m.text == "note 19"));
     }
 }

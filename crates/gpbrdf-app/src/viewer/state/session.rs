@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use eframe::egui::Color32;
 use gpbrdf_core::AtomicFile;
 use serde::{Deserialize, Serialize};
 
+use super::document::Document;
+use super::documents::Documents;
+use super::settings::Settings;
 use crate::viewer::spec::ModelSpec;
-use crate::viewer::state::document::Document;
-use crate::viewer::state::settings::Settings;
 
-/// What a session file says that it is.
+/// The value of `format` in every session file.
 const FORMAT: &str = "gpbrdf session";
 
 /// An open material in a session.
@@ -26,6 +28,17 @@ pub(crate) struct SavedDocument {
     pub(crate) spec: ModelSpec,
 }
 
+impl SavedDocument {
+    /// Makes an open material look as it did when it was saved.
+    pub(crate) fn restore(self, document: &mut Document) {
+        document.name = self.name;
+        let [r, g, b] = self.colour;
+        document.colour = Color32::from_rgb(r, g, b);
+        document.visible = self.visible;
+        document.spec = self.spec;
+    }
+}
+
 /// A session.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Session {
@@ -35,7 +48,7 @@ pub(crate) struct Session {
 }
 
 impl Session {
-    pub(crate) fn new(documents: &[Document], settings: &Settings) -> Self {
+    pub(crate) fn new(documents: &Documents, settings: Settings) -> Self {
         let documents = documents.iter().map(|d| SavedDocument {
             path: d.source.path.clone(),
             built_in: d.source.path.is_none().then(|| d.source.name.clone()),
@@ -44,7 +57,7 @@ impl Session {
             visible: d.visible,
             spec: d.spec.clone(),
         });
-        Self { format: FORMAT.to_owned(), documents: documents.collect(), settings: settings.clone() }
+        Self { format: FORMAT.to_owned(), documents: documents.collect(), settings }
     }
 
     /// Whether a file's name is that of a session.
@@ -85,13 +98,17 @@ mod tests {
     #[test]
     fn sessions_come_back_as_they_went_and_others_are_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
-        let mut document = Document::new(DocumentId(3), Source::built_in("ward").unwrap());
+        let mut documents = Documents::default();
+        let document = documents.add(Source::built_in("ward").unwrap());
         document.name = "my wood".into();
         document.spec.shape = [12, 10, 8];
-        let session = Session::new(&[document], &Settings::default());
+        let session = Session::new(&documents, Settings::default());
         let path = folder.path().join("a.json");
         session.write(&path).unwrap();
         assert_eq!(Session::read(&path).unwrap(), session);
+        let mut again = Document::new(DocumentId(3), Source::built_in("ward").unwrap());
+        session.documents[0].clone().restore(&mut again);
+        assert_eq!((again.name.as_str(), again.spec.shape), ("my wood", [12, 10, 8]));
         std::fs::write(&path, "{\"format\": 3}").unwrap();
         let message = format!("{:#}", Session::read(&path).unwrap_err());
         assert!(message.contains("a.json"), "{message}");

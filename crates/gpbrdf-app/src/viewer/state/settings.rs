@@ -1,88 +1,29 @@
 //! What the program remembers from run to run.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::viewer::work::curves::CurveLook;
-use crate::viewer::work::scene::{Orbit, Shape};
-use crate::viewer::work::slices::SliceLook;
-use crate::viewer::work::spheres::SphereLight;
-
 /// Files kept in the list of recent ones.
 const MAX_RECENT: usize = 12;
 
-/// Which views share the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Arrangement {
-    #[default]
-    All,
-    Slices,
-    Plots,
-    Sphere,
-}
-
-impl Arrangement {
-    pub(crate) const ALL: [Self; 4] = [Self::All, Self::Slices, Self::Plots, Self::Sphere];
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::All => "Overview",
-            Self::Slices => "Slices",
-            Self::Plots => "Plots",
-            Self::Sphere => "3-D",
-        }
-    }
-}
-
-/// What the sphere view shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum SphereShown {
-    /// Truth and prediction in one sphere, either side of a line.
-    #[default]
-    Swipe,
-    SideBySide,
-    Difference,
-    Sigma,
-}
-
-impl SphereShown {
-    pub(crate) const ALL: [Self; 4] = [Self::Swipe, Self::SideBySide, Self::Difference, Self::Sigma];
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Swipe => "Swipe",
-            Self::SideBySide => "Side by side",
-            Self::Difference => "Difference",
-            Self::Sigma => "Sigma",
-        }
-    }
-}
-
-/// Everything that is remembered.
+/// Everything that is remembered. Panes are named as by `Pane::name`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
     pub(crate) recent: Vec<PathBuf>,
-    /// None follows the system.
+    /// `None` follows the system.
     pub(crate) dark: Option<bool>,
     pub(crate) zoom: f32,
+    /// Whether the menu, the panel at the side and the status line are shown.
     pub(crate) panels: bool,
-    pub(crate) arrangement: Arrangement,
-    /// What the overview shows where there is no room for all.
-    pub(crate) tab: Arrangement,
-    pub(crate) slices: SliceLook,
-    pub(crate) show_samples: bool,
-    pub(crate) show_regions: bool,
-    pub(crate) curves: CurveLook,
-    pub(crate) sphere: SphereShown,
-    pub(crate) light: SphereLight,
-    /// The file of the environment; none for the built-in one.
-    pub(crate) environment: Option<PathBuf>,
-    pub(crate) shape: Shape,
-    pub(crate) orbit: Orbit,
-    /// Where the sphere is divided, in `[0, 1]`.
-    pub(crate) swipe: f32,
+    /// The view that has the window to itself; `None` for the overview.
+    pub(crate) view: Option<String>,
+    /// The view that the overview shows where there is no room for all of them; `None` for the first.
+    pub(crate) tab: Option<String>,
+    /// What each pane remembers, by the name of the pane.
+    pub(crate) panes: BTreeMap<String, serde_json::Value>,
 }
 
 impl Default for Settings {
@@ -92,18 +33,9 @@ impl Default for Settings {
             dark: Some(true),
             zoom: 1.0,
             panels: true,
-            arrangement: Arrangement::All,
-            tab: Arrangement::Sphere,
-            slices: SliceLook::default(),
-            show_samples: false,
-            show_regions: false,
-            curves: CurveLook::default(),
-            sphere: SphereShown::Swipe,
-            light: SphereLight::default(),
-            environment: None,
-            shape: Shape::Sphere,
-            orbit: Orbit::default(),
-            swipe: 0.5,
+            view: None,
+            tab: None,
+            panes: BTreeMap::new(),
         }
     }
 }
@@ -120,16 +52,53 @@ impl Settings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::viewer::state::look::{SceneLook, SliceLook};
+    use std::collections::HashMap;
 
     #[test]
     fn settings_come_back_and_what_is_missing_is_as_at_first() {
         let mut settings = Settings { zoom: 1.25, dark: Some(false), ..Settings::default() };
-        settings.slices.square_theta_h = true;
+        let look = SliceLook { square_theta_h: true, ..SliceLook::default() };
+        settings.panes.insert("slices".to_owned(), serde_json::to_value(look).unwrap());
         settings.remember(Path::new("a.binary"));
         let text = serde_json::to_string(&settings).unwrap();
-        assert_eq!(serde_json::from_str::<Settings>(&text).unwrap(), settings);
+        let found = serde_json::from_str::<Settings>(&text).unwrap();
+        assert_eq!(found, settings);
+        assert_eq!(serde_json::from_value::<SliceLook>(found.panes["slices"].clone()).unwrap(), look);
         let partial: Settings = serde_json::from_str("{\"zoom\": 2.0}").unwrap();
         assert_eq!(partial, Settings { zoom: 2.0, ..Settings::default() });
+    }
+
+    #[derive(Default)]
+    struct Memory(HashMap<String, String>);
+
+    impl eframe::Storage for Memory {
+        fn get_string(&self, key: &str) -> Option<String> {
+            self.0.get(key).cloned()
+        }
+
+        fn set_string(&mut self, key: &str, value: String) {
+            self.0.insert(key.to_owned(), value);
+        }
+
+        fn remove_string(&mut self, key: &str) {
+            self.0.remove(key);
+        }
+
+        fn flush(&mut self) {}
+    }
+
+    #[test]
+    fn settings_survive_the_format_of_the_window_library() {
+        let mut settings = Settings { view: Some("slices".to_owned()), ..Settings::default() };
+        let shape = crate::viewer::state::look::Shape::File("a.obj".into());
+        let look = SceneLook { shape, swipe: 0.3, ..SceneLook::default() };
+        settings.panes.insert("3d".to_owned(), serde_json::to_value(&look).unwrap());
+        let mut memory = Memory::default();
+        eframe::set_value(&mut memory, "settings", &settings);
+        let found: Settings = eframe::get_value(&memory, "settings").unwrap();
+        assert_eq!(found, settings);
+        assert_eq!(serde_json::from_value::<SceneLook>(found.panes["3d"].clone()).unwrap(), look);
     }
 
     #[test]

@@ -1,111 +1,165 @@
-//! Where everything stands in the window.
+//! How panes share the window.
 
-use eframe::egui::{self, CentralPanel, Frame, Panel, RichText, Ui, Vec2};
+use eframe::egui::{self, Rect, RichText, ScrollArea, Ui, UiBuilder, Vec2};
 
-use crate::viewer::app::Viewer;
-use crate::viewer::state::settings::Arrangement;
-use crate::viewer::ui::shortcuts::{self, Action};
-use crate::viewer::ui::widgets::segments_ui;
+use super::pane::{Pane, PaneContext, Place, Share, Slot};
+use super::shortcuts::OPEN;
+use super::widgets::{narrow, segments_ui};
+use crate::viewer::state::settings::Settings;
 
 /// Room that all views need at once, and that one needs.
 const ROOMY: Vec2 = egui::vec2(840.0, 560.0);
 const LEAST: Vec2 = egui::vec2(400.0, 300.0);
 
-/// Width of the panel of materials and models, in windows of this width and in narrower ones.
-const WIDE: f32 = 1200.0;
-const PANEL: [f32; 2] = [320.0, 276.0];
+/// Between the views of the overview.
+const GAP: f32 = 14.0;
 
-impl Viewer {
-    /// The whole window.
-    pub(crate) fn window_ui(&mut self, ui: &mut Ui) {
-        if self.settings.panels {
-            Panel::top("menu").show(ui, |ui| self.menu_ui(ui));
-        }
-        self.messages.messages_ui(ui);
-        if self.settings.panels {
-            Panel::bottom("status").show(ui, |ui| self.status_ui(ui));
-            let width = PANEL[usize::from(ui.available_width() < WIDE)];
-            Panel::left("side").resizable(false).exact_size(width).show(ui, |ui| {
-                egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                    self.materials_ui(ui);
-                    self.model_ui(ui);
-                });
+/// From this width of the window on the panel at the side is wide.
+const WIDE: f32 = 1200.0;
+/// Widths of the wide and of the narrow panel.
+const SIDE: [f32; 2] = [320.0, 276.0];
+
+/// All panes, with what they share.
+pub(crate) struct Panes<'a> {
+    pub(crate) list: &'a mut [Box<dyn Pane>],
+    pub(crate) cx: &'a mut PaneContext,
+    pub(crate) settings: &'a mut Settings,
+}
+
+/// The name and the title of each view.
+pub(crate) fn views(panes: &[Box<dyn Pane>]) -> Vec<(&'static str, &'static str)> {
+    let views = panes.iter().filter(|p| matches!(p.place(), Place::View(_)));
+    views.map(|pane| (pane.name(), pane.title())).collect()
+}
+
+impl Panes<'_> {
+    /// The panel at the side.
+    pub(crate) fn side_ui(&mut self, ui: &mut Ui) {
+        let width = SIDE[usize::from(ui.available_width() < WIDE)];
+        egui::Panel::left("side").resizable(false).exact_size(width).show(ui, |ui| {
+            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                for pane in self.list.iter_mut().filter(|p| p.place() == Place::Side) {
+                    ui.push_id(pane.name(), |ui| pane.ui(ui, self.cx));
+                }
             });
-        }
-        let frame = Frame::central_panel(ui.style()).inner_margin(10);
-        CentralPanel::default().frame(frame).show(ui, |ui| self.views_ui(ui));
-        let ctx = ui.ctx().clone();
-        self.open_window_ui(&ctx);
-        self.save_window_ui(&ctx);
-        self.help_window_ui(&ctx);
+        });
     }
 
-    fn views_ui(&mut self, ui: &mut Ui) {
-        if self.documents.is_empty() {
+    /// The view that the user has chosen, or the overview.
+    pub(crate) fn views_ui(&mut self, ui: &mut Ui) {
+        if self.cx.documents.is_empty() {
             ui.centered_and_justified(|ui| {
-                let keys = shortcuts::text(ui.ctx(), Action::Open);
+                let keys = ui.ctx().format_shortcut(&OPEN);
                 ui.label(RichText::new(format!("Drop a material here, or open one with {keys}")).size(18.0));
             });
             return;
         }
-        let mut view = self.settings.arrangement;
-        let there = ui.available_size();
-        if view == Arrangement::All {
-            if there.x >= ROOMY.x && there.y >= ROOMY.y {
-                self.overview_ui(ui);
-                return;
-            }
-            // Large text or a small window: one view at a time, as large as there is room.
-            ui.horizontal(|ui| {
-                let tabs = [Arrangement::Sphere, Arrangement::Plots, Arrangement::Slices];
-                segments_ui(ui, &mut self.settings.tab, &tabs, |tab| match tab {
-                    Arrangement::Sphere => "Material",
-                    Arrangement::Plots => "Curves",
-                    _ => "Images",
-                });
-            });
-            view = self.settings.tab;
-        }
-        let there = ui.available_size();
-        if there.x >= LEAST.x && there.y >= LEAST.y {
-            self.view_ui(ui, view);
+        let chosen = self.settings.view.as_deref();
+        let view = self.list.iter().position(|p| p.place() != Place::Side && Some(p.name()) == chosen);
+        if let Some(view) = view {
+            self.single_ui(ui, view);
             return;
         }
-        // The wheel zooms what is under it.
-        let area = egui::ScrollArea::both().scroll_source(egui::scroll_area::ScrollSource::SCROLL_BAR);
+        let room = ui.available_size();
+        if room.x >= ROOMY.x && room.y >= ROOMY.y {
+            self.overview_ui(ui);
+        } else {
+            self.tabs_ui(ui);
+        }
+    }
+
+    /// The panes that share the overview, in the order of their slots.
+    fn shares(&self) -> Vec<(Share, usize)> {
+        let shares = self.list.iter().enumerate().filter_map(|(i, pane)| match pane.place() {
+            Place::View(share) => share.map(|share| (share, i)),
+            Place::Side => None,
+        });
+        let mut shares: Vec<_> = shares.collect();
+        shares.sort_by_key(|(share, _)| share.slot);
+        shares
+    }
+
+    /// Where the window is small or text is large: one view at a time, as large as there is room.
+    fn tabs_ui(&mut self, ui: &mut Ui) {
+        let shares = self.shares();
+        let tabs: Vec<usize> = shares.iter().map(|(_, i)| *i).collect();
+        let kept = self.settings.tab.as_deref();
+        let kept = kept.and_then(|name| tabs.iter().copied().find(|&i| self.list[i].name() == name));
+        let Some(mut tab) = kept.or(tabs.first().copied()) else { return };
+        let title = |tab| shares.iter().find(|(_, i)| *i == tab).map_or("", |(share, _)| share.tab);
+        if ui.horizontal(|ui| segments_ui(ui, &mut tab, &tabs, title)).inner {
+            self.settings.tab = Some(self.list[tab].name().to_owned());
+        }
+        self.single_ui(ui, tab);
+    }
+
+    /// One view alone, with scroll bars where there is little room.
+    fn single_ui(&mut self, ui: &mut Ui, view: usize) {
+        let room = ui.available_size();
+        if room.x >= LEAST.x && room.y >= LEAST.y {
+            self.list[view].ui(ui, self.cx);
+            return;
+        }
+        // The wheel zooms the view under it.
+        let area = ScrollArea::both().scroll_source(egui::scroll_area::ScrollSource::SCROLL_BAR);
         area.auto_shrink(false).show(ui, |ui| {
-            let size = there.max(LEAST) - egui::Vec2::splat(12.0);
+            let size = room.max(LEAST) - Vec2::splat(12.0);
             let (rect, _) = ui.allocate_exact_size(size, egui::Sense::hover());
-            ui.scope_builder(egui::UiBuilder::new().max_rect(rect), |ui| self.view_ui(ui, view));
+            ui.scope_builder(UiBuilder::new().max_rect(rect), |ui| self.list[view].ui(ui, self.cx));
         });
     }
 
-    fn view_ui(&mut self, ui: &mut Ui, view: Arrangement) {
-        match view {
-            Arrangement::Slices => self.slices_ui(ui),
-            Arrangement::Plots => self.plots_ui(ui),
-            Arrangement::Sphere | Arrangement::All => self.sphere_ui(ui),
-        }
-    }
-
-    /// All views at once.
+    /// All views that have a share of the overview.
     fn overview_ui(&mut self, ui: &mut Ui) {
         let area = ui.available_rect_before_wrap();
-        // Four slices in a row take what their width allows; the rest is the sphere's and the plots'.
-        let gap = 14.0;
-        let slices = (0.25 * area.width() + 36.0).min(area.height() * 0.46);
-        let split = (area.height() - slices - gap).round();
-        let sphere_width = (split * 0.92).min(area.width() * 0.42).round();
-        let top = egui::Rect::from_min_size(area.min, egui::vec2(sphere_width, split));
-        let right = egui::Rect::from_min_max(
-            egui::pos2(top.max.x + gap, area.min.y),
-            egui::pos2(area.max.x, top.max.y),
-        );
-        let below = egui::Rect::from_min_max(egui::pos2(area.min.x, top.max.y + gap), area.max);
-        let views = [Arrangement::Sphere, Arrangement::Plots, Arrangement::Slices];
-        for (rect, view) in std::iter::zip([top, right, below], views) {
-            let builder = egui::UiBuilder::new().max_rect(rect).id_salt(view.name());
-            ui.scope_builder(builder, |ui| self.view_ui(ui, view));
+        let shares = self.shares();
+        for (slot, rect) in slots(area) {
+            let here: Vec<usize> = shares.iter().filter(|(s, _)| s.slot == slot).map(|(_, i)| *i).collect();
+            let count = narrow(here.len() as f64);
+            let width = (rect.width() - GAP * (count - 1.0)) / count;
+            for (k, i) in here.into_iter().enumerate() {
+                let left = rect.left() + narrow(k as f64) * (width + GAP);
+                let part =
+                    Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(width, rect.height()));
+                let pane = &mut self.list[i];
+                let builder = UiBuilder::new().max_rect(part).id_salt(pane.name());
+                ui.scope_builder(builder, |ui| pane.ui(ui, self.cx));
+            }
+        }
+    }
+}
+
+/// The slots of the overview in an area.
+fn slots(area: Rect) -> [(Slot, Rect); 3] {
+    // Below there is room for a row of four squares as wide as the window; the other two slots share the
+    // rest.
+    let below = (0.25 * area.width() + 36.0).min(area.height() * 0.46);
+    let height = (area.height() - below - GAP).round();
+    let width = (height * 0.92).min(area.width() * 0.42).round();
+    let left = Rect::from_min_size(area.min, egui::vec2(width, height));
+    let right = Rect::from_min_max(
+        egui::pos2(left.right() + GAP, area.top()),
+        egui::pos2(area.right(), left.bottom()),
+    );
+    let below = Rect::from_min_max(egui::pos2(area.left(), left.bottom() + GAP), area.max);
+    [(Slot::Left, left), (Slot::Right, right), (Slot::Below, below)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_fill_the_overview_and_do_not_overlap() {
+        for size in [[840.0, 560.0], [1440.0, 900.0], [3000.0, 700.0]] {
+            let area = Rect::from_min_size(egui::pos2(10.0, 20.0), Vec2::from(size));
+            let slots = slots(area);
+            for (i, (_, rect)) in slots.iter().enumerate() {
+                assert!(area.contains_rect(*rect) && rect.is_positive(), "{rect} in {area}");
+                for (_, other) in &slots[..i] {
+                    assert!(!rect.intersects(*other), "{rect} and {other}");
+                }
+            }
         }
     }
 }

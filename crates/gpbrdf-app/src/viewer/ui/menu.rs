@@ -1,103 +1,109 @@
 //! The menus and the choice of views.
 
-use eframe::egui::{self, Ui};
+use eframe::egui::{self, Button, Ui};
 use gpbrdf_core::materials;
 
-use crate::viewer::app::Viewer;
-use crate::viewer::state::settings::Arrangement;
-use crate::viewer::ui::shortcuts::{self, Action};
-use crate::viewer::work::dialogs::Purpose;
+use super::pane::Command;
+use super::shortcuts::{self, Action};
+use crate::viewer::state::settings::Settings;
 
-impl Viewer {
-    pub(crate) fn menu_ui(&mut self, ui: &mut Ui) {
-        let ctx = ui.ctx().clone();
-        let item = |ui: &mut Ui, text: &str, action: Action| {
-            let keys = shortcuts::text(&ctx, action);
-            ui.add(egui::Button::new(text).shortcut_text(keys)).clicked()
-        };
+/// The bar at the top of the window.
+pub(crate) struct Menu<'a> {
+    pub(crate) settings: &'a mut Settings,
+    /// All commands, of the program and of the panes.
+    pub(crate) commands: &'a [(Action, Command)],
+    /// Name and title of each view.
+    pub(crate) views: &'a [(&'static str, &'static str)],
+}
+
+impl Menu<'_> {
+    /// Draws the bar; what was chosen.
+    pub(crate) fn ui(&mut self, ui: &mut Ui) -> Option<Action> {
+        let mut chosen = None;
         egui::MenuBar::new().ui(ui, |ui| {
-            ui.menu_button("File", |ui| {
-                for (text, action) in [
-                    ("Open…", Action::Open),
-                    ("Save session…", Action::SaveSession),
-                    ("Screenshot", Action::Screenshot),
-                ] {
-                    if item(ui, text, action) {
-                        self.act(&ctx, action);
-                        ui.close();
-                    }
-                }
-                ui.separator();
-                for (text, purpose, name) in [
-                    ("Export slices…", Purpose::ExportSlices, "slices.png"),
-                    ("Export sphere…", Purpose::ExportSphere, "sphere.png"),
-                    ("Save model…", Purpose::SaveModel, "model.safetensors"),
-                ] {
-                    if ui.button(text).clicked() {
-                        self.ask_where(purpose, name);
-                        ui.close();
-                    }
-                }
-                ui.separator();
-                ui.menu_button("Recent", |ui| {
-                    if self.settings.recent.is_empty() {
-                        ui.weak("None yet");
-                    }
-                    for path in self.settings.recent.clone() {
-                        if ui.button(path.display().to_string()).clicked() {
-                            self.open_paths(&[path]);
-                            ui.close();
-                        }
-                    }
-                });
-                if item(ui, "Quit", Action::Quit) {
-                    self.act(&ctx, Action::Quit);
-                }
-            });
-            ui.menu_button("Materials", |ui| {
-                for material in materials() {
-                    if ui.button(material.title).on_hover_text(material.description).clicked() {
-                        self.open_built_in(material.name, None);
-                        ui.close();
-                    }
-                }
-            });
-            ui.menu_button("View", |ui| {
-                let themes = [("Dark", Some(true)), ("Light", Some(false)), ("As the system", None)];
-                for (name, dark) in themes {
-                    ui.radio_value(&mut self.settings.dark, dark, name);
-                }
-                ui.separator();
-                for (name, zoom) in [("100 %", 1.0), ("125 %", 1.25), ("150 %", 1.5), ("200 %", 2.0)] {
-                    if ui.radio((ctx.zoom_factor() - zoom).abs() < 0.01, name).clicked() {
-                        ctx.set_zoom_factor(zoom);
-                    }
-                }
-                ui.separator();
-                if item(ui, "Hide panels", Action::TogglePanels) {
-                    self.act(&ctx, Action::TogglePanels);
-                    ui.close();
-                }
-                if ui.button("Reset views").clicked() {
-                    self.reset_next = true;
-                    ui.close();
-                }
-            });
-            ui.menu_button("Help", |ui| {
-                if item(ui, "Shortcuts", Action::Help) {
-                    self.act(&ctx, Action::Help);
-                    ui.close();
-                }
-            });
+            ui.menu_button("File", |ui| self.file_ui(ui, &mut chosen));
+            ui.menu_button("Materials", |ui| materials_ui(ui, &mut chosen));
+            ui.menu_button("View", |ui| self.view_ui(ui, &mut chosen));
+            ui.menu_button("Help", |ui| self.item_ui(ui, "Shortcuts", Action::Help, &mut chosen));
             ui.add_space(12.0);
-            let actions = [Action::Overview, Action::Slices, Action::Plots, Action::Sphere];
-            for (view, action) in Arrangement::ALL.into_iter().zip(actions) {
-                let shown = self.settings.arrangement == view;
-                let help = format!("Show it ({})", shortcuts::text(&ctx, action));
-                if ui.selectable_label(shown, view.name()).on_hover_text(help).clicked() {
-                    self.settings.arrangement = view;
+            self.views_ui(ui, &mut chosen);
+        });
+        chosen
+    }
+
+    /// An entry with its key.
+    fn item_ui(&self, ui: &mut Ui, words: &str, action: Action, chosen: &mut Option<Action>) {
+        let keys = shortcuts::text(ui.ctx(), self.commands, &action);
+        let button = Button::new(words);
+        let button = if keys.is_empty() { button } else { button.shortcut_text(keys) };
+        if ui.add(button).clicked() {
+            *chosen = Some(action);
+            ui.close();
+        }
+    }
+
+    fn file_ui(&self, ui: &mut Ui, chosen: &mut Option<Action>) {
+        // The commands of the panes follow those of the program.
+        let mut of_panes = false;
+        for (action, command) in self.commands {
+            let Some(words) = command.menu else { continue };
+            if matches!(action, Action::Pane(..)) && !of_panes {
+                of_panes = true;
+                ui.separator();
+            }
+            self.item_ui(ui, words, action.clone(), chosen);
+        }
+        ui.separator();
+        ui.menu_button("Recent", |ui| {
+            if self.settings.recent.is_empty() {
+                ui.weak("None yet");
+            }
+            for path in &self.settings.recent {
+                if ui.button(path.display().to_string()).clicked() {
+                    *chosen = Some(Action::Open(path.clone()));
+                    ui.close();
                 }
             }
         });
+        self.item_ui(ui, "Quit", Action::Quit, chosen);
+    }
+
+    fn view_ui(&mut self, ui: &mut Ui, chosen: &mut Option<Action>) {
+        for (name, dark) in [("Dark", Some(true)), ("Light", Some(false)), ("As the system", None)] {
+            ui.radio_value(&mut self.settings.dark, dark, name);
+        }
+        ui.separator();
+        for (name, zoom) in [("100 %", 1.0), ("125 %", 1.25), ("150 %", 1.5), ("200 %", 2.0)] {
+            if ui.radio((ui.ctx().zoom_factor() - zoom).abs() < 0.01, name).clicked() {
+                ui.ctx().set_zoom_factor(zoom);
+            }
+        }
+        ui.separator();
+        self.item_ui(ui, "Hide panels", Action::TogglePanels, chosen);
+        self.item_ui(ui, "Reset views", Action::ResetViews, chosen);
+    }
+
+    /// The overview and each view, of which one is shown.
+    fn views_ui(&self, ui: &mut Ui, chosen: &mut Option<Action>) {
+        let views = self.views.iter().map(|&(name, title)| (Some(name), title, Action::View(name)));
+        let shown = self.settings.view.as_deref();
+        // The overview is shown if no view has this name.
+        let shown = shown.filter(|shown| self.views.iter().any(|(name, _)| name == shown));
+        for (name, title, action) in std::iter::once((None, "Overview", Action::Overview)).chain(views) {
+            let keys = shortcuts::text(ui.ctx(), self.commands, &action);
+            let help = format!("Show it ({keys})");
+            if ui.selectable_label(shown == name, title).on_hover_text(help).clicked() {
+                *chosen = Some(action);
+            }
+        }
+    }
+}
+
+fn materials_ui(ui: &mut Ui, chosen: &mut Option<Action>) {
+    for material in materials() {
+        if ui.button(material.title).on_hover_text(material.description).clicked() {
+            *chosen = Some(Action::OpenBuiltIn(material.name));
+            ui.close();
+        }
     }
 }

@@ -3,14 +3,17 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::containers::menu::{MenuButton, MenuConfig};
-use eframe::egui::{self, ComboBox, Key, Response, RichText, Slider, Ui};
+use eframe::egui::{self, ComboBox, Response, RichText, Slider, TextureHandle, Ui};
+use gpbrdf_core::Colormap;
+
+use crate::viewer::work::slices::colour;
 
 /// Width of the labels of a form.
 const LABEL_WIDTH: f32 = 104.0;
 /// Width of the number beside a slider.
 const NUMBER_WIDTH: f32 = 86.0;
 
-/// A number to set.
+/// A number that can be set.
 #[derive(Clone, Debug)]
 pub(crate) struct Number<'a> {
     pub(crate) label: &'a str,
@@ -52,7 +55,7 @@ impl<'a> Number<'a> {
         if reset(ui, &response) {
             *value = self.default;
         }
-        // Sliders show what they can, and must not change what they show.
+        // A slider shows the nearest value that it can, and must not change the value by showing it.
         if response.changed() || reset(ui, &response) { *value != before } else { restore(value, before) }
     }
 }
@@ -68,49 +71,7 @@ pub(crate) fn reset(ui: &Ui, response: &Response) -> bool {
     over && ui.input(|i| i.modifiers.command && (i.pointer.primary_down() || i.pointer.primary_clicked()))
 }
 
-/// What keys ask of a view that has the focus: arrows, plus and minus, Home.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ViewKeys {
-    /// Presses.
-    pub(crate) right: f64,
-    pub(crate) up: f64,
-    /// A factor.
-    pub(crate) zoom: f64,
-    pub(crate) reset: bool,
-}
-
-impl ViewKeys {
-    /// Reads the keys.
-    pub(crate) fn of(ctx: &egui::Context, response: &Response) -> Self {
-        if !response.has_focus() {
-            return Self { right: 0.0, up: 0.0, zoom: 1.0, reset: false };
-        }
-        let filter =
-            egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
-        ctx.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
-        ctx.input(|input| {
-            let presses =
-                |key: Key| if input.modifiers.command { 0.0 } else { input.num_presses(key) as f64 };
-            let larger = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
-            Self {
-                right: presses(Key::ArrowRight) - presses(Key::ArrowLeft),
-                up: presses(Key::ArrowUp) - presses(Key::ArrowDown),
-                zoom: 1.15f64.powf(larger),
-                reset: input.key_pressed(Key::Home),
-            }
-        })
-    }
-}
-
-/// Shows that a view has the focus.
-pub(crate) fn focus_ui(ui: &Ui, response: &Response) {
-    if response.has_focus() {
-        let stroke = ui.visuals().selection.stroke;
-        ui.painter().rect_stroke(response.rect, 4.0, stroke, egui::StrokeKind::Inside);
-    }
-}
-
-/// A row of a form: a label and what stands beside it, whose inputs the label names.
+/// A row of a form: a label and controls beside it, which the label names.
 pub(crate) fn row_ui<R>(ui: &mut Ui, label: &str, content: impl FnOnce(&mut Ui) -> R) -> R {
     ui.horizontal(|ui| {
         let height = ui.spacing().interact_size.y;
@@ -182,6 +143,22 @@ pub(crate) fn segments_ui<T: Copy + PartialEq>(
     *value != before
 }
 
+/// Puts an image into a texture that is no longer shown, or into a new one.
+pub(crate) fn put_texture(
+    ctx: &egui::Context,
+    old: &mut Option<TextureHandle>,
+    name: String,
+    image: egui::ColorImage,
+) -> TextureHandle {
+    match old.take() {
+        Some(mut texture) => {
+            texture.set(image, egui::TextureOptions::LINEAR);
+            texture
+        }
+        None => ctx.load_texture(name, image, egui::TextureOptions::LINEAR),
+    }
+}
+
 /// The heading of a part of a panel.
 pub(crate) fn section_ui(ui: &mut Ui, title: &str) {
     ui.add_space(8.0);
@@ -189,7 +166,32 @@ pub(crate) fn section_ui(ui: &mut Ui, title: &str) {
     ui.add_space(2.0);
 }
 
-/// Four digits that count.
+/// The bar of a colour map.
+pub(crate) fn scale_ui(ui: &mut Ui, map: Colormap) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(72.0, 9.0), egui::Sense::hover());
+    let mut mesh = egui::Mesh::default();
+    let steps: u16 = 24;
+    for k in 0..=steps {
+        let t = f64::from(k) / f64::from(steps);
+        let x = egui::lerp(rect.left()..=rect.right(), narrow(t));
+        let fill = colour(map, t);
+        mesh.colored_vertex(egui::pos2(x, rect.top()), fill);
+        mesh.colored_vertex(egui::pos2(x, rect.bottom()), fill);
+        if k > 0 {
+            let v = 2 * u32::from(k);
+            mesh.add_triangle(v - 2, v - 1, v);
+            mesh.add_triangle(v - 1, v, v + 1);
+        }
+    }
+    ui.painter().add(mesh);
+}
+
+/// A peak signal-to-noise ratio for people.
+pub(crate) fn psnr_text(psnr: f64) -> String {
+    if psnr.is_finite() { format!("PSNR {psnr:.1} dB") } else { "PSNR ∞ dB".to_owned() }
+}
+
+/// A number for people, with four significant digits.
 pub(crate) fn short(x: f64) -> String {
     if !x.is_finite() {
         return if x > 0.0 { "∞".to_owned() } else { "–".to_owned() };
@@ -207,8 +209,8 @@ pub(crate) fn short(x: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Rounds to the window's precision.
-#[expect(clippy::cast_possible_truncation, reason = "f32 is the window's precision")]
+/// Rounds to the precision of the window.
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the window")]
 pub(crate) fn narrow(x: f64) -> f32 {
     x as f32
 }

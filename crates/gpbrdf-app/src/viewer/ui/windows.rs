@@ -1,101 +1,156 @@
-//! Small windows: what to open, where to write, the shortcuts.
+//! Small windows: what to open, which file to read or write, the shortcuts.
 
 use std::path::PathBuf;
 
 use eframe::egui::{self, Context, RichText, Ui};
 use gpbrdf_core::materials;
 
-use crate::viewer::app::Viewer;
-use crate::viewer::ui::shortcuts::{MOUSE, SHORTCUTS};
-use crate::viewer::work::dialogs::Purpose;
+use super::pane::Command;
+use super::shortcuts::{Action, MOUSE};
+use crate::viewer::work::dialogs::{Access, Question};
 
-impl Viewer {
-    pub(crate) fn open_window_ui(&mut self, ctx: &Context) {
-        let mut open = self.windows.open;
-        let mut chosen = None;
-        egui::Window::new("Open materials")
-            .open(&mut open)
-            .collapsible(false)
-            .vscroll(true)
-            .default_width(420.0)
-            .show(ctx, |ui| {
-                ui.label("A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model or session:");
-                chosen = self.path_row_ui(ui, "Path to open", "Open", Purpose::Open);
-                ui.add_space(6.0);
-                ui.label(RichText::new("Built-in materials").strong());
-                ui.horizontal_wrapped(|ui| {
-                    for material in materials() {
-                        if ui.button(material.title).on_hover_text(material.description).clicked() {
-                            chosen = Some(PathBuf::from(material.name));
-                        }
-                    }
-                });
-            });
-        self.windows.open = open && self.windows.open;
-        if let Some(path) = chosen {
-            self.chosen(Purpose::Open, &[path]);
+/// The small windows that are open.
+#[derive(Debug)]
+pub(crate) struct Windows {
+    /// The question for files to open, which is asked in a window of its own.
+    open: Question,
+    is_open: bool,
+    help: bool,
+    /// The question for another file.
+    question: Option<Question>,
+    /// What has been typed.
+    path: String,
+}
+
+/// What the user has done in a window.
+#[derive(Debug)]
+pub(crate) enum Reply {
+    /// Chosen a path.
+    Path(Question, PathBuf),
+    /// Chosen a built-in material.
+    BuiltIn(&'static str),
+    /// Asked for the dialog of the system.
+    Browse(Question),
+}
+
+impl Windows {
+    /// No window is open. `open` is the question that [`Self::ask_open`] asks.
+    pub(crate) fn new(open: Question) -> Self {
+        Self { open, is_open: false, help: false, question: None, path: String::new() }
+    }
+
+    /// Asks for files to open.
+    pub(crate) fn ask_open(&mut self) {
+        self.is_open = true;
+        self.path.clear();
+    }
+
+    /// Asks for a file.
+    pub(crate) fn ask(&mut self, question: Question) {
+        match question.access {
+            Access::Write { name } => name.clone_into(&mut self.path),
+            Access::Read { .. } | Access::ReadMany { .. } => self.path.clear(),
+        }
+        self.question = Some(question);
+    }
+
+    /// Closes the window of a question that has been answered.
+    pub(crate) fn answered(&mut self, question: &Question) {
+        if question.title == self.open.title {
+            self.is_open = false;
+        } else if self.question.as_ref().is_some_and(|q| q.title == question.title) {
+            self.question = None;
         }
     }
 
-    pub(crate) fn save_window_ui(&mut self, ctx: &Context) {
-        let Some(purpose) = self.windows.save else { return };
-        let (title, what) = match purpose {
-            Purpose::SaveSession => ("Save session", "The open materials and how they are shown, as JSON."),
-            Purpose::ExportSlices => {
-                ("Export slices", "A PNG figure, and linear slices as EXR files beside it.")
-            }
-            Purpose::ExportSphere => {
-                ("Export sphere", "A PNG figure, and linear pictures as EXR files beside it.")
-            }
-            Purpose::SaveModel => ("Save model", "The fitted model with its weights, as safetensors."),
-            Purpose::Environment => ("Environment", "A latitude-longitude map, .hdr or .exr."),
-            Purpose::Object => ("Object", "A Wavefront OBJ file."),
-            Purpose::Open => return,
-        };
+    /// Shows or hides the shortcuts.
+    pub(crate) fn toggle_help(&mut self) {
+        self.help ^= true;
+    }
+
+    /// Closes all windows; whether there were any.
+    pub(crate) fn close_all(&mut self) -> bool {
+        let any = self.is_open || self.help || self.question.is_some();
+        (self.is_open, self.help, self.question) = (false, false, None);
+        any
+    }
+
+    /// Draws the windows that are open.
+    pub(crate) fn ui(&mut self, ctx: &Context, commands: &[(Action, Command)]) -> Option<Reply> {
+        let opened = self.open_ui(ctx);
+        let answered = self.question_ui(ctx);
+        self.help_ui(ctx, commands);
+        opened.or(answered)
+    }
+
+    fn open_ui(&mut self, ctx: &Context) -> Option<Reply> {
+        let mut open = self.is_open;
+        let mut reply = None;
+        let question = self.open.clone();
+        let window = egui::Window::new(question.title).open(&mut open).collapsible(false).vscroll(true);
+        window.default_width(420.0).show(ctx, |ui| {
+            ui.label(question.help);
+            reply = self.path_row_ui(ui, "Path to open", "Open", &question);
+            ui.add_space(6.0);
+            ui.label(RichText::new("Built-in materials").strong());
+            ui.horizontal_wrapped(|ui| {
+                for material in materials() {
+                    if ui.button(material.title).on_hover_text(material.description).clicked() {
+                        reply = Some(Reply::BuiltIn(material.name));
+                    }
+                }
+            });
+        });
+        self.is_open = open && !matches!(reply, Some(Reply::BuiltIn(_)));
+        reply
+    }
+
+    fn question_ui(&mut self, ctx: &Context) -> Option<Reply> {
+        let question = self.question.clone()?;
         let mut open = true;
-        let mut chosen = None;
-        egui::Window::new(title).open(&mut open).collapsible(false).default_width(420.0).show(ctx, |ui| {
-            ui.label(what);
-            let verb =
-                if matches!(purpose, Purpose::Environment | Purpose::Object) { "Load" } else { "Write" };
-            chosen = self.path_row_ui(ui, "Path", verb, purpose);
+        let mut reply = None;
+        let window = egui::Window::new(question.title).open(&mut open).collapsible(false);
+        window.default_width(420.0).show(ctx, |ui| {
+            ui.label(question.help);
+            let verb = if matches!(question.access, Access::Write { .. }) { "Write" } else { "Load" };
+            reply = self.path_row_ui(ui, "Path", verb, &question);
         });
         if !open {
-            self.windows.save = None;
+            self.question = None;
         }
-        if let Some(path) = chosen {
-            self.chosen(purpose, &[path]);
-        }
+        reply
     }
 
-    /// A path to type, or to choose in the system's dialog; the path once it is meant.
-    fn path_row_ui(&mut self, ui: &mut Ui, label: &str, verb: &str, purpose: Purpose) -> Option<PathBuf> {
-        let mut chosen = None;
+    /// A field for a path, a button with a verb that takes it, and one that opens the dialog of the system.
+    fn path_row_ui(&mut self, ui: &mut Ui, label: &str, verb: &str, question: &Question) -> Option<Reply> {
+        let mut reply = None;
         ui.horizontal(|ui| {
             let width = ui.available_width() - 150.0;
-            let field = egui::TextEdit::singleline(&mut self.windows.path).desired_width(width);
+            let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
             let field = ui.add(field).accessible_name(label);
             let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
-            let given = !self.windows.path.trim().is_empty();
+            let path = self.path.trim();
+            let given = !path.is_empty();
             if (ui.add_enabled(given, egui::Button::new(verb)).clicked() || entered) && given {
-                chosen = Some(PathBuf::from(self.windows.path.trim()));
+                reply = Some(Reply::Path(question.clone(), PathBuf::from(path)));
             }
-            if ui.button("Browse…").on_hover_text("The system's file dialog").clicked() {
-                self.browse(purpose);
+            if ui.button("Browse…").on_hover_text("The file dialog of the system").clicked() {
+                reply = Some(Reply::Browse(question.clone()));
             }
         });
-        chosen
+        reply
     }
 
-    pub(crate) fn help_window_ui(&mut self, ctx: &Context) {
+    fn help_ui(&mut self, ctx: &Context, commands: &[(Action, Command)]) {
         // All of it where there is room.
         let height = 0.9 * ctx.content_rect().height();
-        let window = egui::Window::new("Shortcuts").open(&mut self.windows.help);
+        let window = egui::Window::new("Shortcuts").open(&mut self.help);
         window.collapsible(false).vscroll(true).default_height(height).show(ctx, |ui| {
             egui::Grid::new("shortcuts").num_columns(2).spacing([24.0, 5.0]).striped(true).show(ui, |ui| {
-                for (_, shortcut, what) in &SHORTCUTS {
-                    ui.label(RichText::new(ctx.format_shortcut(shortcut)).strong());
-                    ui.label(*what);
+                for (_, command) in commands {
+                    let Some(key) = command.key else { continue };
+                    ui.label(RichText::new(ctx.format_shortcut(&key)).strong());
+                    ui.label(&command.help);
                     ui.end_row();
                 }
                 for (how, what) in MOUSE {

@@ -1,77 +1,20 @@
-//! Curves through a BRDF for the plots: values and bands out of tables, and directional albedos.
+//! Curves through a BRDF for the plots: values and intervals looked up in tables, and directional albedos.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gpbrdf_core::{Brdf, BrdfTable, Content, HalfDiff, Rgb, Transform, Trilinear, direction, interval_95};
+use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Rgb, Transform, Trilinear, direction, interval_95};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+use super::mailbox::{Mailbox, Sender};
+use super::outbox::Outbox;
 use crate::viewer::state::document::{Document, DocumentId};
-use crate::viewer::work::fitter::{Event, Outbox};
-use crate::viewer::work::mailbox::{Mailbox, Sender};
-use crate::viewer::work::slices::Channel;
-
-/// What is plotted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub(crate) enum CurveKind {
-    /// Reflected light in the plane of incidence, as a polar plot.
-    #[default]
-    Lobe,
-    ThetaH,
-    ThetaD,
-    PhiD,
-    /// Share of light from one direction that is reflected.
-    Albedo,
-}
-
-impl CurveKind {
-    pub(crate) const ALL: [Self; 5] = [Self::Lobe, Self::ThetaH, Self::ThetaD, Self::PhiD, Self::Albedo];
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Lobe => "Lobe",
-            Self::ThetaH => "Over θh",
-            Self::ThetaD => "Over θd",
-            Self::PhiD => "Over φd",
-            Self::Albedo => "Albedo",
-        }
-    }
-}
-
-/// Which curves, through where.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct CurveLook {
-    pub(crate) kind: CurveKind,
-    /// Degrees.
-    pub(crate) incidence: f64,
-    /// Degrees; where curves over the others stand.
-    pub(crate) at: [f64; 3],
-    pub(crate) log: bool,
-    pub(crate) times_cosine: bool,
-    pub(crate) samples: bool,
-    pub(crate) channel: Channel,
-}
-
-impl Default for CurveLook {
-    fn default() -> Self {
-        Self {
-            kind: CurveKind::Lobe,
-            incidence: 45.0,
-            at: [0.0, 30.0, 90.0],
-            log: false,
-            times_cosine: false,
-            samples: true,
-            channel: Channel::Rgb,
-        }
-    }
-}
+use crate::viewer::state::look::{CurveKind, CurveLook};
 
 /// One point of a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CurvePoint {
-    /// Degrees; of a lobe the angle of the viewer, negative on the light's side.
+    /// Degrees; for a lobe the angle of the viewer, negative on the side of the light.
     pub(crate) x: f64,
     pub(crate) truth: Option<f64>,
     pub(crate) mean: f64,
@@ -90,7 +33,7 @@ fn directions(look: &CurveLook, points: usize) -> Vec<(f64, HalfDiff)> {
             let wo = direction(x.to_radians(), 0.0);
             (x, HalfDiff::from_directions(&wi, &wo))
         }
-        // Denser at the peak.
+        // Points are denser at the peak.
         CurveKind::ThetaH => {
             let x = 90.0 * t(i) * t(i);
             (x, HalfDiff { theta_h: x.to_radians(), theta_d: at[1], phi_d: at[2] })
@@ -107,7 +50,7 @@ fn directions(look: &CurveLook, points: usize) -> Vec<(f64, HalfDiff)> {
     all.filter(|(_, angles)| angles.is_above_horizon()).collect()
 }
 
-/// The factor of a direction: the light's cosine where values are shown times it.
+/// The factor of the values at a direction: the cosine of the light, or 1 where it is not wanted.
 fn factor(look: &CurveLook, angles: HalfDiff) -> f64 {
     match look.kind {
         _ if !look.times_cosine => 1.0,
@@ -123,11 +66,7 @@ pub(crate) fn curve(document: &Document, look: &CurveLook) -> Vec<CurvePoint> {
     let points = directions(look, 361).into_iter().map(|(x, angles)| {
         let scale = factor(look, angles);
         let mean = fitted.mean.eval_half_diff(angles);
-        let truth = match &document.truth {
-            Some(truth) => Some(truth.eval_half_diff(angles)),
-            None if document.has_truth() => document.source.brdf().map(|brdf| brdf.eval_half_diff(angles)),
-            None => None,
-        };
+        let truth = document.truth_at(angles);
         let band =
             fitted.sigma.as_ref().map(|sigma| band_at(fitted.model.transform, mean, sigma, noise, angles));
         let value = |rgb: Rgb| scale * look.channel.of(rgb);
@@ -141,7 +80,7 @@ pub(crate) fn curve(document: &Document, look: &CurveLook) -> Vec<CurvePoint> {
     points.collect()
 }
 
-/// The 95 % interval of a measurement, out of tables.
+/// The 95 % interval of a measurement, from the tables of mean and sigma.
 pub(crate) fn band_at(
     transform: Transform,
     mean: Rgb,
@@ -155,7 +94,7 @@ pub(crate) fn band_at(
     (ends.map(|e| e.0), ends.map(|e| e.1))
 }
 
-/// How far, in degrees, a sample may stand off a curve to be drawn beside it.
+/// The largest distance, in degrees, of the samples that are drawn with a curve.
 const NEAR: f64 = 1.5;
 
 /// The samples next to a curve: abscissa and value.
@@ -165,7 +104,7 @@ pub(crate) fn samples_near(document: &Document, look: &CurveLook) -> Vec<[f64; 2
     let mut found = Vec::new();
     for (angles, &value) in std::iter::zip(&fitted.samples.angles, &fitted.samples.values) {
         let [h, d, p] = [angles.theta_h, angles.theta_d, angles.phi_d].map(f64::to_degrees);
-        // Bilateral layouts hold one side only.
+        // Layouts with bilateral symmetry hold one half of the range only.
         let p_off = (p - look.at[2]).abs().min((180.0 - p - look.at[2]).abs());
         let x = match look.kind {
             CurveKind::ThetaH if near(d, look.at[1], NEAR) && p_off <= 3.0 * NEAR => h,
@@ -179,7 +118,7 @@ pub(crate) fn samples_near(document: &Document, look: &CurveLook) -> Vec<[f64; 2
     found
 }
 
-/// The directional albedo of a document: of its truth and its prediction, at [`ALBEDO_ANGLES`].
+/// The directional albedo of a document's truth and of its prediction, at each of [`ALBEDO_ANGLES`] angles.
 #[derive(Clone, Debug)]
 pub(crate) struct Albedo {
     pub(crate) document: DocumentId,
@@ -187,7 +126,7 @@ pub(crate) struct Albedo {
     pub(crate) mean: Vec<Rgb>,
 }
 
-/// Angles of incidence of albedos: 0, 5, .. 85 degrees.
+/// The number of angles of incidence of albedos: 0, 5, .. 85 degrees.
 pub(crate) const ALBEDO_ANGLES: usize = 18;
 
 /// Albedos to compute.
@@ -200,19 +139,20 @@ pub(crate) struct AlbedoRequest {
 }
 
 impl AlbedoRequest {
-    /// The albedo of an open material; none until it is fitted.
+    /// The request for an open material; `None` until it is fitted.
     pub(crate) fn of(document: &Document) -> Option<Self> {
         let fitted = document.fitted.as_ref()?;
-        let truth = match document.source.content {
-            Content::Table(_) | Content::Function(_) => document.truth.clone(),
-            _ => None,
-        };
-        Some(Self { document: document.id, version: fitted.version, truth, mean: Arc::clone(&fitted.mean) })
+        Some(Self {
+            document: document.id,
+            version: fitted.version,
+            truth: document.truth.clone(),
+            mean: Arc::clone(&fitted.mean),
+        })
     }
 }
 
 /// Starts the thread that integrates.
-pub(crate) fn spawn(outbox: Outbox) -> std::io::Result<Sender<Vec<AlbedoRequest>>> {
+pub(crate) fn spawn(outbox: Outbox<Vec<Albedo>>) -> std::io::Result<Sender<Vec<AlbedoRequest>>> {
     Mailbox::spawn("albedo", move |requests: Vec<AlbedoRequest>, stale| {
         let mut found = Vec::new();
         for request in requests {
@@ -225,12 +165,12 @@ pub(crate) fn spawn(outbox: Outbox) -> std::io::Result<Sender<Vec<AlbedoRequest>
                 mean: albedo(&request.mean),
             });
         }
-        outbox.send(Event::Albedo(found));
+        outbox.send(found);
     })
 }
 
-/// `integral of f cos theta_o d omega_o` by the midpoint rule, uniform in `sin^2 theta_o` and the azimuth, 48 x 48
-/// directions by symmetry over half of the azimuths.
+/// The integral of `f cos(theta_o)` over the directions `omega_o` by the midpoint rule, uniform in
+/// `sin^2(theta_o)` and in the azimuth. By symmetry 48 x 48 directions cover half of the azimuths.
 fn albedo(table: &BrdfTable) -> Vec<Rgb> {
     const N: usize = 48;
     (0..ALBEDO_ANGLES)

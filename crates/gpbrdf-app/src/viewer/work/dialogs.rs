@@ -1,47 +1,52 @@
-//! The system's file dialogs, off the window's thread.
+//! Questions for files, and the system's file dialogs, which run on threads of their own.
 
-use crate::viewer::work::fitter::{Event, Outbox};
+use std::path::PathBuf;
 
-/// What a chosen file is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
-    Open,
-    Environment,
-    Object,
-    SaveSession,
-    ExportSlices,
-    ExportSphere,
-    SaveModel,
+use super::outbox::Outbox;
+
+/// What is to be done with a file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Access {
+    /// Read a file of a kind, which has a name and endings.
+    Read { kind: &'static str, endings: &'static [&'static str] },
+    /// Read any number of files of a kind, or of any other.
+    ReadMany { kind: &'static str, endings: &'static [&'static str] },
+    /// Write a file, to which this name is given unless the user chooses another.
+    Write { name: &'static str },
 }
 
-/// Asks for files; an answer comes as an event, none if the user gives up.
-pub(crate) fn ask(purpose: Purpose, outbox: &Outbox) {
+/// A question for a file.
+#[derive(Clone, Debug)]
+pub(crate) struct Question {
+    /// The title of the window that asks.
+    pub(crate) title: &'static str,
+    /// What the file is or will be.
+    pub(crate) help: &'static str,
+    pub(crate) access: Access,
+    /// Where the chosen path goes.
+    pub(crate) answer: Outbox<PathBuf>,
+}
+
+/// Asks a question in the system's dialog. The question and the chosen paths are sent to `outbox`; nothing is
+/// sent if the user chooses no file.
+pub(crate) fn browse(question: Question, outbox: &Outbox<(Question, Vec<PathBuf>)>) {
     let outbox = outbox.clone();
-    let asked = move || {
+    let ask = move || {
         let dialog = rfd::FileDialog::new();
-        let paths = match purpose {
-            Purpose::Open => dialog
-                .add_filter("Materials", &["binary", "bsdf", "csv", "exr", "safetensors", "brdf", "json"])
-                .add_filter("All files", &["*"])
-                .pick_files()
-                .unwrap_or_default(),
-            Purpose::Environment => {
-                dialog.add_filter("Environment maps", &["hdr", "exr"]).pick_file().into_iter().collect()
+        let paths: Vec<PathBuf> = match question.access {
+            Access::Read { kind, endings } => {
+                dialog.add_filter(kind, endings).pick_file().into_iter().collect()
             }
-            Purpose::Object => dialog.add_filter("Wavefront OBJ", &["obj"]).pick_file().into_iter().collect(),
-            Purpose::SaveSession => save(dialog, "session.json"),
-            Purpose::ExportSlices => save(dialog, "slices.png"),
-            Purpose::ExportSphere => save(dialog, "sphere.png"),
-            Purpose::SaveModel => save(dialog, "model.safetensors"),
+            Access::ReadMany { kind, endings } => {
+                let dialog = dialog.add_filter(kind, endings).add_filter("All files", &["*"]);
+                dialog.pick_files().unwrap_or_default()
+            }
+            Access::Write { name } => dialog.set_file_name(name).save_file().into_iter().collect(),
         };
         if !paths.is_empty() {
-            outbox.send(Event::Chosen { purpose, paths });
+            outbox.send((question, paths));
         }
     };
-    // Without a thread there is still the path field.
-    let _no_dialog = std::thread::Builder::new().name("dialog".into()).spawn(asked);
-}
-
-fn save(dialog: rfd::FileDialog, name: &str) -> Vec<std::path::PathBuf> {
-    dialog.set_file_name(name).save_file().into_iter().collect()
+    // Without a thread there is still the field for a path.
+    let _no_dialog = std::thread::Builder::new().name("dialog".into()).spawn(ask);
 }

@@ -1,26 +1,27 @@
-//! Pictures and models as files, written off the window's thread.
+//! Pictures and models as files, written by threads of their own.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use eframe::egui::Context;
-use gpbrdf_core::{AtomicFile, Brdf, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
+use gpbrdf_core::{AtomicFile, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
 
-use crate::viewer::app::Viewer;
-use crate::viewer::work::fitter::{Event, Outbox};
+use super::outbox::{Outbox, in_background};
+use super::slices::Truth;
+use super::spheres::SphereImages;
+use crate::viewer::state::document::Document;
+use crate::viewer::state::look::SliceLook;
 
-/// Runs `work` on a thread of its own and says how it went.
-fn in_background(outbox: &Outbox, work: impl FnOnce() -> Result<String> + Send + 'static) {
-    let outbox = outbox.clone();
-    let fallback = outbox.clone();
-    let job = move || outbox.send(Event::Saved { result: work().map_err(|e| format!("{e:#}")) });
-    if let Err(error) = std::thread::Builder::new().name("writer".into()).spawn(job) {
-        fallback.send(Event::Saved { result: Err(format!("cannot write: {error}")) });
-    }
+/// What became of a file: a sentence for the user, or an error.
+pub(crate) type Saved = Result<String, String>;
+
+/// Writes files on a thread of its own and reports how it went.
+fn write(outbox: &Outbox<Saved>, work: impl FnOnce() -> Result<String> + Send + 'static) {
+    in_background(outbox, "writer", "cannot write", || work().map_err(|error| format!("{error:#}")));
 }
 
-/// `name.png` with a suffix in place of its extension.
+/// The path `name.png` with a suffix in place of its extension.
 fn beside(path: &Path, suffix: &str) -> PathBuf {
     let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     path.with_file_name(format!("{stem}{suffix}"))
@@ -39,23 +40,17 @@ fn exr_file(path: &Path, size: [usize; 2], pixels: &[Rgb]) -> Result<AtomicFile>
     Ok(file)
 }
 
-/// The selected material's slices: a figure, and linear values beside it.
-pub(crate) fn slices(viewer: &mut Viewer, path: &Path) {
-    let Some(document) = viewer.document() else { return };
+/// Writes the slices of a material: a figure, and linear values beside it.
+pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox: &Outbox<Saved>) {
     let Some(fitted) = document.fitted.clone() else {
-        viewer.messages.error("nothing to export: no model has been fitted yet");
+        outbox.send(Err("nothing to export: no model has been fitted yet".to_owned()));
         return;
     };
-    let (truth, source) = (document.truth.clone(), Arc::clone(&document.source));
+    let truth = Truth::of(document);
     let (name, path) = (document.name.clone(), path.with_extension("png"));
-    let options = viewer.settings.slices.options();
-    let has_truth = document.has_truth();
-    in_background(&viewer.outbox, move || {
-        let truth: Option<&dyn Brdf> = match &truth {
-            Some(table) => Some(table.as_ref()),
-            None if has_truth => source.brdf(),
-            None => None,
-        };
+    let options = look.options();
+    write(outbox, move || {
+        let truth = truth.as_ref().and_then(Truth::brdf);
         let picture = slice_figure(&name, truth, fitted.mean.as_ref(), None, &options)?;
         let mut files = vec![png_file(&path, &picture)?];
         let size = [options.size; 2];
@@ -79,20 +74,15 @@ pub(crate) fn slices(viewer: &mut Viewer, path: &Path) {
     });
 }
 
-/// The sphere as it is shown: a figure, and linear pictures beside it.
-pub(crate) fn sphere(viewer: &mut Viewer, path: &Path) {
-    let (Some(document), Some(shown)) = (viewer.document(), &viewer.spheres) else {
-        viewer.messages.error("nothing to export: no sphere has been drawn yet");
-        return;
-    };
-    let (images, psnr) = (shown.images.linear.clone(), shown.images.psnr);
-    let (name, path) = (document.name.clone(), path.with_extension("png"));
-    in_background(&viewer.outbox, move || {
-        let find = |which: &str| images.iter().find(|(n, _)| *n == which).map(|(_, image)| image);
-        let Some(mean) = find("prediction") else { bail!("no sphere has been drawn yet") };
-        let picture = sphere_figure(&name, find("truth"), mean, None, psnr)?;
+/// Writes spheres as they are shown: a figure, and linear pictures beside it.
+pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &Outbox<Saved>) {
+    let (truth, prediction) = (images.linear_truth.clone(), images.linear_mean.clone());
+    let (name, path, psnr) = (name.to_owned(), path.with_extension("png"), images.psnr);
+    write(outbox, move || {
+        let picture = sphere_figure(&name, truth.as_ref(), &prediction, None, psnr)?;
         let mut files = vec![png_file(&path, &picture)?];
-        for (which, image) in &images {
+        let linear = truth.iter().map(|image| ("truth", image)).chain([("prediction", &prediction)]);
+        for (which, image) in linear {
             let pixels: Vec<Rgb> = image.pixels().iter().map(|p| p.map(f64::from)).collect();
             let target = beside(&path, &format!("-{which}.exr"));
             files.push(exr_file(&target, [image.width(), image.height()], &pixels)?);
@@ -102,28 +92,27 @@ pub(crate) fn sphere(viewer: &mut Viewer, path: &Path) {
     });
 }
 
-/// The selected material's model.
-pub(crate) fn model(viewer: &mut Viewer, path: &Path) {
-    let Some(fitted) = viewer.document().and_then(|d| d.fitted.clone()) else {
-        viewer.messages.error("nothing to save: no model has been fitted yet");
+/// Writes the model of a material.
+pub(crate) fn model(document: &Document, path: &Path, outbox: &Outbox<Saved>) {
+    let Some(model) = document.fitted.as_ref().map(|fitted| Arc::clone(&fitted.model)) else {
+        outbox.send(Err("nothing to save: no model has been fitted yet".to_owned()));
         return;
     };
     let path = path.with_extension("safetensors");
-    in_background(&viewer.outbox, move || {
+    write(outbox, move || {
         let mut file = AtomicFile::create(&path)?;
-        std::io::Write::write_all(&mut file, &fitted.model.to_bytes()?)
+        std::io::Write::write_all(&mut file, &model.to_bytes()?)
             .with_context(|| format!("cannot write \"{}\"", path.display()))?;
         file.commit()?;
         Ok(format!("saved model \"{}\"", path.display()))
     });
 }
 
-/// A picture of the window, as PNG and EXR in the folder of screenshots.
-pub(crate) fn screenshot(ctx: &Context, viewer: &Viewer) {
-    let (outbox, folder) = (viewer.outbox.clone(), viewer.pictures.clone());
+/// Writes a picture of the window as PNG and EXR to a folder, to the current one if `folder` is `None`.
+pub(crate) fn screenshot(ctx: &Context, folder: Option<PathBuf>, outbox: &Outbox<Saved>) {
+    let outbox = outbox.clone();
     ctx.request_screenshot(move |image| {
-        let folder = folder.clone();
-        in_background(&outbox, move || {
+        write(&outbox, move || {
             let [width, height] = image.size;
             let folder =
                 folder.map_or_else(std::env::current_dir, Ok).context("cannot find the current folder")?;
@@ -132,6 +121,7 @@ pub(crate) fn screenshot(ctx: &Context, viewer: &Viewer) {
                 let [r, g, b, _] = image.pixels[y * width + x].to_array();
                 [r, g, b]
             });
+            // The inverse of the curve of IEC 61966-2-1.
             let linear = |x: u8| {
                 let x = f64::from(x) / 255.0;
                 if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
@@ -147,7 +137,7 @@ pub(crate) fn screenshot(ctx: &Context, viewer: &Viewer) {
     });
 }
 
-/// A name in a folder that no file has.
+/// A path in a folder that no file has yet.
 fn free_name(folder: &Path, stem: &str) -> Result<PathBuf> {
     let mut names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
     let free = names.find(|p| !p.exists() && !p.with_extension("exr").exists());

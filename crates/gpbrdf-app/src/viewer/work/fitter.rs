@@ -1,9 +1,8 @@
-//! The thread that samples, fits and bakes. The newest request of a document replaces its older ones, and the newest of
-//! all goes first: work on another document gives way and is taken up again later.
+//! The thread that samples, fits and bakes. The newest request of a document replaces its older ones. The
+//! newest of all requests goes first: work on another document is interrupted and begins again later.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -12,73 +11,70 @@ use gpbrdf_core::{
     SigmaTable, Source, bake_mean, bake_sigma, condition, fit_per_axis, interval_95,
 };
 
+use super::outbox::Outbox;
 use crate::viewer::spec::{ModelSpec, SampleKey};
-use crate::viewer::state::document::{DocumentId, Fitted};
+use crate::viewer::state::document::{Document, DocumentId, Fitted, Stage, Work};
 
-/// What the threads tell the window.
+/// What the thread reports about a document.
 #[derive(Debug)]
-pub(crate) enum Event {
-    /// A stage of a document's request has begun.
-    Stage { document: DocumentId, stage: &'static str, evaluations: usize },
+pub(crate) struct Report {
+    pub(crate) document: DocumentId,
+    pub(crate) news: News,
+}
+
+/// One thing to report.
+#[derive(Debug)]
+pub(crate) enum News {
+    /// A stage of the request has begun, or the search has evaluated the likelihood so many times.
+    Stage { stage: Stage, evaluations: usize },
     /// A model and its mean.
-    Fitted { document: DocumentId, fitted: Box<Fitted> },
+    Fitted(Box<Fitted>),
     /// Sigma of a result.
-    Sigma { document: DocumentId, version: u64, sigma: Arc<BrdfTable> },
+    Sigma { version: u64, sigma: Arc<BrdfTable> },
     /// The truth as a table.
-    Truth { document: DocumentId, truth: Arc<BrdfTable> },
+    Truth(Arc<BrdfTable>),
     /// Metrics of a result.
-    Cells { document: DocumentId, version: u64, cells: Box<CellMetrics> },
-    /// All stages of a request are over.
-    Done { document: DocumentId },
-    /// A request ended with an error.
-    Failed { document: DocumentId, message: String },
-    /// A file has been read, or not; with what the session says about it.
-    Opened {
-        result: Result<Box<Source>, String>,
-        restore: Option<Box<crate::viewer::state::session::SavedDocument>>,
-    },
-    /// A file has been written, or not.
-    Saved { result: Result<String, String> },
-    /// Paths chosen in a dialog.
-    Chosen { purpose: crate::viewer::work::dialogs::Purpose, paths: Vec<std::path::PathBuf> },
-    /// Slices in colour.
-    Slices(Box<crate::viewer::work::slices::SliceImages>),
-    /// Directional albedos.
-    Albedo(Vec<crate::viewer::work::curves::Albedo>),
-    /// Spheres in colour.
-    Spheres(Box<crate::viewer::work::spheres::SphereImages>),
-    /// An object on the device.
-    Scene(Box<crate::viewer::work::scene::SceneImage>),
-    /// How close an object's prediction is.
-    Quality(crate::viewer::work::quality::Quality),
-    /// An object cannot be shown: its file is broken or the device refuses.
-    SceneFailed(String),
-    /// The device of objects was lost and is opened anew.
-    DeviceLost(String),
-    /// Metrics of pictures of a result.
-    Images { document: DocumentId, version: u64, images: Box<gpbrdf_core::ImageMetrics> },
-    /// An environment has been read, or not.
-    Environment { result: Result<(std::path::PathBuf, Arc<gpbrdf_core::Environment>), String> },
+    Cells { version: u64, cells: Box<CellMetrics> },
+    /// All stages of the request are over.
+    Done,
+    /// The request ended with an error.
+    Failed(String),
 }
 
-/// Sends events and wakes the window.
-#[derive(Clone)]
-pub(crate) struct Outbox {
-    pub(crate) events: Sender<Event>,
-    pub(crate) wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl std::fmt::Debug for Outbox {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Outbox")
-    }
-}
-
-impl Outbox {
-    /// Sends an event; one that nobody waits for any more is dropped.
-    pub(crate) fn send(&self, event: Event) {
-        let _closing = self.events.send(event);
-        (self.wake)();
+impl News {
+    /// Takes the news into the document that they are about. Once the user has cancelled a request, it stays
+    /// cancelled.
+    pub(crate) fn apply(self, document: &mut Document) {
+        let cancelled = document.work == Work::Cancelled;
+        match self {
+            Self::Stage { stage, evaluations } if !cancelled => {
+                let since = match document.work {
+                    Work::Running { since, .. } if stage != Stage::Sampling => since,
+                    _ => Instant::now(),
+                };
+                document.work = Work::Running { stage, since, evaluations };
+            }
+            Self::Fitted(fitted) => {
+                if document.spec.hyper.is_none() {
+                    document.optimum = Hyper::of(&fitted.model);
+                }
+                document.fitted = Some(*fitted);
+            }
+            Self::Sigma { version, sigma } => {
+                if let Some(fitted) = document.result_mut(version) {
+                    fitted.sigma = Some(sigma);
+                }
+            }
+            Self::Truth(truth) => document.truth = Some(truth),
+            Self::Cells { version, cells } => {
+                if let Some(fitted) = document.result_mut(version) {
+                    fitted.cells = Some(*cells);
+                }
+            }
+            Self::Done if !cancelled => document.work = Work::Idle,
+            Self::Stage { .. } | Self::Done => {}
+            Self::Failed(message) => document.work = Work::Failed(message),
+        }
     }
 }
 
@@ -93,7 +89,7 @@ pub(crate) struct Request {
 
 #[derive(Debug, Default)]
 struct Queue {
-    /// The last is the next.
+    /// The last one is served next.
     requests: Vec<Request>,
     running: Option<Running>,
     forgotten: Vec<DocumentId>,
@@ -121,7 +117,7 @@ pub(crate) struct Fitter {
     shared: Arc<Shared>,
 }
 
-/// Stops a request: cancelled, or an error with its chain of causes.
+/// Why a request ended early: it was cancelled, or there was an error, whose message contains its causes.
 enum Stop {
     Cancelled,
     Error(String),
@@ -139,14 +135,14 @@ fn lock(shared: &Shared) -> MutexGuard<'_, Queue> {
 
 impl Fitter {
     /// Starts the thread.
-    pub(crate) fn new(outbox: Outbox) -> std::io::Result<Self> {
+    pub(crate) fn new(outbox: Outbox<Report>) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let theirs = Arc::clone(&shared);
         std::thread::Builder::new().name("fitter".into()).spawn(move || serve(&theirs, &outbox))?;
         Ok(Self { shared })
     }
 
-    /// Asks for a model, before all that was asked for earlier.
+    /// Requests a model, which is fitted before all that were requested earlier.
     pub(crate) fn submit(&self, request: Request) {
         let mut queue = lock(&self.shared);
         queue.requests.retain(|r| r.document != request.document);
@@ -159,7 +155,7 @@ impl Fitter {
         self.shared.wake.notify_one();
     }
 
-    /// Gives up what was asked for a document.
+    /// Cancels the requests of a document.
     pub(crate) fn cancel(&self, document: DocumentId) {
         let mut queue = lock(&self.shared);
         queue.requests.retain(|r| r.document != document);
@@ -169,14 +165,14 @@ impl Fitter {
         }
     }
 
-    /// Gives up a document and drops what is kept of it.
+    /// Cancels the requests of a document and drops its samples.
     pub(crate) fn forget(&self, document: DocumentId) {
         self.cancel(document);
         lock(&self.shared).forgotten.push(document);
         self.shared.wake.notify_one();
     }
 
-    /// Whether there is anything to do: slower work then waits.
+    /// A test of whether there is anything to do; slower work waits meanwhile.
     pub(crate) fn busy(&self) -> impl Fn() -> bool + Send + Sync + 'static {
         let shared = Arc::clone(&self.shared);
         move || shared.busy.load(Ordering::Relaxed)
@@ -195,10 +191,10 @@ impl Drop for Fitter {
     }
 }
 
-/// Samples by document, kept while nothing they depend on changes.
+/// Samples by document, kept while everything on which they depend stays the same.
 type Kept = HashMap<DocumentId, (SampleKey, Arc<SampleSet>)>;
 
-fn serve(shared: &Shared, outbox: &Outbox) {
+fn serve(shared: &Shared, outbox: &Outbox<Report>) {
     let mut kept = Kept::new();
     loop {
         let (request, cancel) = {
@@ -228,27 +224,28 @@ fn serve(shared: &Shared, outbox: &Outbox) {
         let mut queue = lock(shared);
         let requeue = queue.running.take().is_some_and(|r| r.requeue);
         match result {
-            Ok(()) => outbox.send(Event::Done { document }),
+            Ok(()) => outbox.send(Report { document, news: News::Done }),
             Err(Stop::Cancelled) if requeue && !queue.requests.iter().any(|r| r.document == document) => {
                 queue.requests.insert(0, request);
             }
             Err(Stop::Cancelled) => {}
-            Err(Stop::Error(message)) => outbox.send(Event::Failed { document, message }),
+            Err(Stop::Error(message)) => outbox.send(Report { document, news: News::Failed(message) }),
         }
     }
 }
 
-/// Numbers of results.
+/// The version of the next result.
 static VERSION: AtomicU64 = AtomicU64::new(1);
 
-fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox) -> Result<(), Stop> {
+fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox<Report>) -> Result<(), Stop> {
     let document = request.document;
     let cancelled = || cancel.load(Ordering::Relaxed);
-    let stage = |stage: &'static str, evaluations: usize| {
+    let tell = |news: News| outbox.send(Report { document, news });
+    let begin = |stage: Stage| {
         if cancelled() {
             return Err(Stop::Cancelled);
         }
-        outbox.send(Event::Stage { document, stage, evaluations });
+        tell(News::Stage { stage, evaluations: 0 });
         Ok(())
     };
     let mut seconds = [0.0; 3];
@@ -257,46 +254,43 @@ fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox)
         seconds[slot] = start.elapsed().as_secs_f64();
         start = Instant::now();
     };
-    stage("Sampling", 0)?;
+    begin(Stage::Sampling)?;
     let (samples, model, value, report) = if let Content::Model(model) = &request.source.content {
         (Arc::new(SampleSet::default()), (**model).clone(), f64::NAN, None)
     } else {
         let samples = sample(request, kept)?;
         lap(0);
-        stage("Fitting", 0)?;
+        begin(Stage::Fitting)?;
         let told = |evaluations: usize| {
             if evaluations.is_multiple_of(8) {
-                outbox.send(Event::Stage { document, stage: "Fitting", evaluations });
+                tell(News::Stage { stage: Stage::Fitting, evaluations });
             }
         };
         let (model, value, report) = fit(request, &samples, &cancelled, &told)?;
         (samples, model, value, report)
     };
     lap(1);
-    stage("Baking the mean", 0)?;
+    begin(Stage::BakingMean)?;
     let mean = Arc::new(bake_mean(&model));
     lap(2);
     let version = VERSION.fetch_add(1, Ordering::Relaxed);
     let model = Arc::new(model);
-    outbox.send(Event::Fitted {
-        document,
-        fitted: Box::new(Fitted {
-            version,
-            model: Arc::clone(&model),
-            samples,
-            log_marginal_likelihood: value,
-            report,
-            mean: Arc::clone(&mean),
-            sigma: None,
-            cells: None,
-            images: None,
-            seconds,
-        }),
-    });
-    stage("Baking sigma", 0)?;
+    tell(News::Fitted(Box::new(Fitted {
+        version,
+        model: Arc::clone(&model),
+        samples,
+        log_marginal_likelihood: value,
+        report,
+        mean: Arc::clone(&mean),
+        sigma: None,
+        cells: None,
+        images: None,
+        seconds,
+    })));
+    begin(Stage::BakingSigma)?;
     let sigma = bake_sigma(&model);
     if let Some(table) = sigma_as_table(&sigma) {
-        outbox.send(Event::Sigma { document, version, sigma: Arc::new(table) });
+        tell(News::Sigma { version, sigma: Arc::new(table) });
     }
     if matches!(request.source.content, Content::Model(_) | Content::Samples(_)) {
         return Ok(());
@@ -304,13 +298,13 @@ fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox)
     let truth = if let Some(truth) = &request.truth {
         Arc::clone(truth)
     } else {
-        stage("Tabulating the truth", 0)?;
+        begin(Stage::Tabulating)?;
         let Some(truth) = request.source.table() else { return Ok(()) };
         let truth = Arc::new(truth.into_owned());
-        outbox.send(Event::Truth { document, truth: Arc::clone(&truth) });
+        tell(News::Truth(Arc::clone(&truth)));
         truth
     };
-    stage("Comparing", 0)?;
+    begin(Stage::Comparing)?;
     let noise = model.noise_variances();
     let interval = |cell: usize| {
         let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
@@ -321,7 +315,7 @@ fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox)
         (ends.map(|e| e.0), ends.map(|e| e.1))
     };
     let cells = Box::new(CellMetrics::new(&truth, &mean, Some(&interval))?);
-    outbox.send(Event::Cells { document, version, cells });
+    tell(News::Cells { version, cells });
     Ok(())
 }
 
@@ -354,7 +348,7 @@ fn fit(
         ..Provenance::default()
     };
     let options = spec.options();
-    // A lattice's hyper-parameters fit no scattered samples, nor the other way round.
+    // Hyper-parameters of a lattice do not suit scattered samples, nor the other way round.
     let given = spec.hyper.as_ref().filter(|h| matches!(h, Hyper::Lattice(_)) == samples.lattice.is_some());
     if let Some(hyper) = given {
         let (model, value) = condition(samples, &options, hyper, provenance)?;

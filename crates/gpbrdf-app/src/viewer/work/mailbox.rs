@@ -1,4 +1,4 @@
-//! Hands the newest request to a thread; what it replaces is never seen.
+//! Hands the newest request to a thread. The thread never sees an older request that has been replaced.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};

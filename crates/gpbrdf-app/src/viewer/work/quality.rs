@@ -1,5 +1,5 @@
-//! How close an object's prediction comes to its truth, measured beside the thread that renders while the picture gets
-//! smooth.
+//! How close the picture of an object's prediction is to that of its truth, measured on a thread of its own
+//! while the pictures get smoother.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use gpbrdf_core::{psnr, ssim};
 use gpbrdf_render::LinearPicture;
 
+use super::mailbox::{Mailbox, Sender};
+use super::outbox::Outbox;
 use crate::viewer::state::document::DocumentId;
-use crate::viewer::work::fitter::{Event, Outbox};
-use crate::viewer::work::mailbox::{Mailbox, Sender};
 
 /// Pictures to compare.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ pub(crate) struct Measured {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Quality {
     pub(crate) document: DocumentId,
-    /// The picture that was measured, and how many samples a pixel it had.
+    /// The picture that was measured, and how many samples per pixel it had.
     pub(crate) picture: u64,
     pub(crate) samples: u32,
     pub(crate) psnr: f64,
@@ -45,16 +45,16 @@ const REST: Duration = Duration::from_millis(400);
 
 impl Measurer {
     /// Starts the thread.
-    pub(crate) fn spawn(outbox: Outbox) -> std::io::Result<Self> {
+    pub(crate) fn spawn(outbox: Outbox<Quality>) -> std::io::Result<Self> {
         let idle = Arc::new(AtomicBool::new(true));
         let theirs = Arc::clone(&idle);
         let sender = Mailbox::spawn("quality", move |measured: Measured, stale| {
             theirs.store(false, Ordering::Relaxed);
             let start = Instant::now();
             if let Some(quality) = measure(&measured) {
-                outbox.send(Event::Quality(quality));
+                outbox.send(quality);
             }
-            // Half of a processor at most, unless the last picture waits already.
+            // Take half of a processor's time at most, unless a newer picture waits already.
             let rest = start.elapsed().min(REST);
             let until = Instant::now() + rest;
             while Instant::now() < until && !stale() {
@@ -65,8 +65,8 @@ impl Measurer {
         Ok(Self { sender, idle, last: None })
     }
 
-    /// Whether a picture is worth reading back: the first samples and the last ones always, those between when there is
-    /// time.
+    /// Whether a picture is worth reading back: always after its first and its last samples, and in between
+    /// when the thread is idle.
     pub(crate) fn wants(&self, picture: u64, samples: u32, last: bool) -> bool {
         let new = self.last.is_none_or(|(known, _)| known != picture);
         self.last != Some((picture, samples)) && (new || last || self.idle.load(Ordering::Relaxed))

@@ -1,9 +1,8 @@
-//! Objects lit on a graphics device, progressively, by a thread that the newest request steers.
+//! Objects lit on a graphics device, progressively, by a thread that serves the newest request.
 //!
-//! The device is not the window's: what the window waits for would wait for the lighting too, and a window that changes
-//! its size wants its device to be idle.
+//! It uses a second device. On the window's device, long dispatches would delay presentation, and wgpu cannot
+//! configure a surface while another thread submits work.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,41 +13,15 @@ use gpbrdf_render::{
     AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
     Mesh, Precision, Renderer, Show, read_obj,
 };
-use serde::{Deserialize, Serialize};
 
+use super::mailbox::{Mailbox, Sender};
+use super::outbox::Outbox;
+use super::quality::{Measured, Measurer, Quality};
 use crate::viewer::state::document::DocumentId;
+use crate::viewer::state::look::{Orbit, Shape, SphereLight, SphereShown};
 use crate::viewer::state::messages::naming;
-use crate::viewer::state::settings::SphereShown;
-use crate::viewer::ui::widgets::narrow;
-use crate::viewer::work::fitter::{Event, Outbox};
-use crate::viewer::work::mailbox::{Mailbox, Sender};
-use crate::viewer::work::quality::{Measured, Measurer};
-use crate::viewer::work::spheres::SphereLight;
-
-/// What is lit.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Shape {
-    /// The sphere, by the processor.
-    #[default]
-    Sphere,
-    Knot,
-    RoundedBox,
-    /// An OBJ file.
-    File(PathBuf),
-}
 
 impl Shape {
-    pub(crate) fn name(&self) -> String {
-        match self {
-            Self::Sphere => "Sphere".to_owned(),
-            Self::Knot => "Knot".to_owned(),
-            Self::RoundedBox => "Rounded box".to_owned(),
-            Self::File(path) => {
-                path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned())
-            }
-        }
-    }
-
     fn geometry(&self) -> Result<Geometry, String> {
         Ok(match self {
             Self::Sphere => Geometry::Sphere,
@@ -59,35 +32,19 @@ impl Shape {
     }
 }
 
-/// From where the object is seen.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct Orbit {
-    /// Radians.
-    pub(crate) azimuth: f32,
-    pub(crate) elevation: f32,
-    pub(crate) zoom: f32,
-}
-
-impl Default for Orbit {
-    fn default() -> Self {
-        Self { azimuth: 0.5, elevation: 0.35, zoom: 1.0 }
-    }
-}
-
 /// What a picture depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SceneKey {
     pub(crate) document: DocumentId,
     pub(crate) version: u64,
-    pub(crate) has_truth: bool,
+    pub(crate) truth_is_tabulated: bool,
     pub(crate) has_sigma: bool,
     pub(crate) shape: Shape,
     pub(crate) orbit: Orbit,
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
     pub(crate) exposure: f32,
-    /// Of one picture, of which there are two side by side.
+    /// Pixels of one picture; there are two of this size side by side.
     pub(crate) size: [u32; 2],
     pub(crate) shown: SphereShown,
     pub(crate) swipe: f32,
@@ -96,16 +53,16 @@ pub(crate) struct SceneKey {
 impl SceneKey {
     /// Whether truth and prediction are two whole pictures.
     fn is_pair(&self) -> bool {
-        self.has_truth && self.shown == SphereShown::SideBySide
+        self.truth_is_tabulated && self.shown == SphereShown::SideBySide
     }
 
-    /// What is shown, on each of two pictures where there are two.
+    /// What each picture shows; the second one is only made side by side.
     fn show(&self) -> [Show; 2] {
         let first = match self.shown {
-            SphereShown::Difference if self.has_truth => Show::Difference,
+            SphereShown::Difference if self.truth_is_tabulated => Show::Difference,
             SphereShown::Sigma => Show::Sigma,
-            SphereShown::Swipe if self.has_truth => Show::Split { at: self.swipe },
-            SphereShown::SideBySide if self.has_truth => Show::Truth,
+            SphereShown::Swipe if self.truth_is_tabulated => Show::Split { at: self.swipe },
+            SphereShown::SideBySide if self.truth_is_tabulated => Show::Truth,
             _ => Show::Prediction,
         };
         [first, Show::Prediction]
@@ -122,28 +79,38 @@ pub(crate) struct SceneRequest {
     pub(crate) environment: Arc<Environment>,
 }
 
+/// What the thread sends.
+#[derive(Clone, Debug)]
+pub(crate) enum SceneResult {
+    Picture(Box<SceneImage>),
+    Quality(Quality),
+    /// The object cannot be shown: its file is broken or the device refuses.
+    Failed(String),
+    /// The device was lost, and another one is opened.
+    DeviceLost(String),
+}
+
 /// A picture of an object.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneImage {
     pub(crate) document: DocumentId,
-    /// Tells this picture, however smooth it gets, from all others.
+    /// A number that stays while this picture gets smoother, and that no other picture has.
     pub(crate) picture: u64,
     pub(crate) image: ColorImage,
-    /// The prediction, where `image` is the truth alone.
+    /// The picture of the prediction, where `image` shows the truth alone.
     pub(crate) beside: Option<ColorImage>,
     pub(crate) samples: u32,
 }
 
 /// Samples of a smooth picture.
 const SAMPLES: u32 = 192;
-/// End of the scales of false colours.
+/// The value at the end of the scales of false colours.
 pub(crate) const LIMIT: f32 = 0.1;
 
-/// Why there is no picture.
+/// Why there is no picture, with a message.
 enum Stop {
-    /// The device is gone; another one may do.
+    /// The device was lost. Another one may do.
     Lost(String),
-    /// With a message.
     Error(String),
 }
 
@@ -154,26 +121,27 @@ impl From<gpbrdf_render::Error> for Stop {
     }
 }
 
-/// Starts the thread that renders, on a device of its own unless one is given; beyond the first samples it lets the
-/// fitter go first.
+/// Starts the thread that renders, on `context` or else on a device that it opens. Beyond the first samples
+/// it waits while the fitter is `busy`.
 pub(crate) fn spawn(
-    outbox: Outbox,
+    outbox: Outbox<SceneResult>,
     context: Option<Context>,
     busy: impl Fn() -> bool + Send + 'static,
 ) -> std::io::Result<Sender<SceneRequest>> {
-    let measurer = Measurer::spawn(outbox.clone())?;
+    let measurer = Measurer::spawn(outbox.map(SceneResult::Quality))?;
     let mut scene = Scene { context, renderer: None, materials: None, last: None, picture: 0, measurer };
     Mailbox::spawn("scene", move |request: SceneRequest, stale| {
         let mut result = scene.render(&request, &outbox, stale, &busy);
         if let Err(Stop::Lost(message)) = &result {
             let name = scene.context.as_ref().map_or_else(String::new, |c| c.info().name.clone());
-            scene.forget(true);
-            outbox.send(Event::DeviceLost(format!("the graphics device \"{name}\" is lost: {message}")));
+            scene.drop_device();
+            outbox
+                .send(SceneResult::DeviceLost(format!("the graphics device \"{name}\" is lost: {message}")));
             result = scene.render(&request, &outbox, stale, &busy);
         }
         if let Err(Stop::Lost(message) | Stop::Error(message)) = result {
-            scene.forget(false);
-            outbox.send(Event::SceneFailed(message));
+            scene.clear();
+            outbox.send(SceneResult::Failed(message));
         }
     })
 }
@@ -187,25 +155,30 @@ struct Scene {
     measurer: Measurer,
 }
 
-/// BRDFs on the device, with what they were made from.
+/// BRDFs on the device.
 struct Materials {
+    /// The truth of this document.
     truth: Option<(DocumentId, BrdfTexture)>,
+    /// The result of this version, and whether its texture holds sigma.
     prediction: (u64, bool, BrdfTexture),
 }
 
 impl Scene {
-    /// Drops what is on the device, which may be in any state, and the device too where it is `lost`.
-    fn forget(&mut self, lost: bool) {
+    /// Drops everything that is on the device, which may be in any state.
+    fn clear(&mut self) {
         (self.renderer, self.materials, self.last) = (None, None, None);
-        if lost {
-            self.context = None;
-        }
+    }
+
+    /// Drops the device too, after its loss.
+    fn drop_device(&mut self) {
+        self.clear();
+        self.context = None;
     }
 
     fn render(
         &mut self,
         request: &SceneRequest,
-        outbox: &Outbox,
+        outbox: &Outbox<SceneResult>,
         stale: &(dyn Fn() -> bool + Sync),
         busy: &dyn Fn() -> bool,
     ) -> Result<(), Stop> {
@@ -232,9 +205,15 @@ impl Scene {
             let image = shown(renderer, first)?;
             let beside = if key.is_pair() { Some(shown(renderer, second)?) } else { None };
             let (document, picture, samples) = (key.document, self.picture, renderer.samples());
-            outbox.send(Event::Scene(Box::new(SceneImage { document, picture, image, beside, samples })));
+            outbox.send(SceneResult::Picture(Box::new(SceneImage {
+                document,
+                picture,
+                image,
+                beside,
+                samples,
+            })));
             let last = samples >= SAMPLES;
-            if key.has_truth && self.measurer.wants(picture, samples, last) {
+            if key.truth_is_tabulated && self.measurer.wants(picture, samples, last) {
                 let linear = renderer.read_linear()?;
                 let exposure = f64::from(display.exposure);
                 self.measurer.put(Measured { document, picture, samples, exposure, linear });
@@ -274,7 +253,7 @@ impl Scene {
             let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
             renderer.set_camera(camera.zoomed(orbit.zoom))?;
         }
-        // A point light turns with the eye.
+        // A point light moves with the eye.
         let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
         if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
             renderer.set_light(light(key, &request.environment))?;
@@ -303,10 +282,8 @@ impl Scene {
             (Some(_), Some(Materials { truth: Some(truth), .. })) if same_truth => Some(truth),
             (Some(table), _) => Some((key.document, BrdfTexture::upload(context, table, None, precision)?)),
         };
-        let sigma = request
-            .sigma
-            .as_ref()
-            .and_then(|table| SigmaTable::from_planes(vec![table.values().iter().map(|v| v[0]).collect()]));
+        let sigma = request.sigma.as_ref();
+        let sigma = sigma.and_then(|table| SigmaTable::from_planes(vec![largest_channel(table)]));
         let prediction = BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision)?;
         renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction)?;
         self.materials = Some(Materials { truth, prediction: (key.version, key.has_sigma, prediction) });
@@ -314,10 +291,15 @@ impl Scene {
     }
 }
 
-/// The light of a request: a point light stands where it does over the picture.
+/// The largest of the three channels in each cell, which is the sigma that textures hold.
+fn largest_channel(table: &BrdfTable) -> Vec<f32> {
+    table.values().iter().map(|cell| cell.iter().copied().fold(0.0, f32::max)).collect()
+}
+
+/// The light of a request. A point light keeps its place over the picture while the eye orbits.
 fn light(key: &SceneKey, environment: &Environment) -> Light {
     if key.light.point {
-        let [x, y] = key.light.at.map(narrow);
+        let [x, y] = key.light.at.map(to_f32);
         let view = Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
         let camera = Camera::perspective(0.6, 1.0).orbited(key.orbit.azimuth, key.orbit.elevation);
         return Light::Directional {
@@ -328,7 +310,7 @@ fn light(key: &SceneKey, environment: &Environment) -> Light {
     Light::Environment(EnvironmentLight::new(&turned(environment, key.light.yaw)))
 }
 
-/// The map turned about the vertical axis, by whole pixels.
+/// The environment turned about the vertical axis, by whole pixels.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the width")]
 fn turned(environment: &Environment, yaw: f64) -> Environment {
     let width = environment.width();
@@ -338,4 +320,26 @@ fn turned(environment: &Environment, yaw: f64) -> Environment {
         row.rotate_left(shift);
     }
     Environment::new(width, environment.height(), pixels).unwrap_or_else(|_| environment.clone())
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the device")]
+fn to_f32(x: f64) -> f32 {
+    x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sigma_of_three_channels_is_the_largest_of_them() {
+        let cell =
+            |a: gpbrdf_core::HalfDiff| if a.theta_h < 0.5 { [0.5, 0.25, 0.75] } else { [0.5, 0.25, 0.0] };
+        let table = BrdfTable::from_fn(cell);
+        let largest = largest_channel(&table);
+        assert_eq!((largest[0], *largest.last().unwrap()), (0.75, 0.5));
+        for (value, cell) in std::iter::zip(largest, table.values()) {
+            assert!(cell.contains(&value) && cell.iter().all(|x| *x <= value));
+        }
+    }
 }

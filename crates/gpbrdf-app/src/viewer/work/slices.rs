@@ -1,94 +1,21 @@
-//! Slices of truth, prediction, difference and sigma in colour, made off the window's thread.
+//! Slices of truth, prediction, difference and sigma in colour, made on a thread of their own.
 
 use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage};
-use gpbrdf_core::{BrdfTable, Colormap, Rgb, Slice, SliceOptions, Source};
-use serde::{Deserialize, Serialize};
+use gpbrdf_core::{Brdf, BrdfTable, Colormap, Rgb, Slice, Source};
 
-use crate::viewer::state::document::DocumentId;
-use crate::viewer::work::fitter::{Event, Outbox};
-use crate::viewer::work::mailbox::{Mailbox, Sender};
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::state::look::{Channel, SliceLook};
 
-/// Rows and columns of a slice.
-pub(crate) const SLICE_SIZE: usize = 256;
+use super::mailbox::{Mailbox, Sender};
+use super::outbox::Outbox;
 
-/// Below the horizon.
+/// The colour of directions below the horizon.
 const BELOW_HORIZON: Color32 = Color32::from_rgb(58, 58, 64);
 
-/// The channels that are shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Channel {
-    #[default]
-    Rgb,
-    Red,
-    Green,
-    Blue,
-}
-
-impl Channel {
-    pub(crate) const ALL: [Self; 4] = [Self::Rgb, Self::Red, Self::Green, Self::Blue];
-
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Rgb => "RGB",
-            Self::Red => "Red",
-            Self::Green => "Green",
-            Self::Blue => "Blue",
-        }
-    }
-
-    /// One number for a colour: the channel, or the mean of all.
-    pub(crate) fn of(self, rgb: Rgb) -> f64 {
-        match self {
-            Self::Rgb => (rgb[0] + rgb[1] + rgb[2]) / 3.0,
-            Self::Red => rgb[0],
-            Self::Green => rgb[1],
-            Self::Blue => rgb[2],
-        }
-    }
-}
-
-/// How slices look.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct SliceLook {
-    /// Degrees.
-    pub(crate) phi_d: f64,
-    /// Stops.
-    pub(crate) exposure: f64,
-    pub(crate) gamma: f64,
-    pub(crate) square_theta_h: bool,
-    /// Colours divided by their largest channel.
-    pub(crate) chroma: bool,
-    pub(crate) channel: Channel,
-}
-
-impl Default for SliceLook {
-    fn default() -> Self {
-        Self {
-            phi_d: 90.0,
-            exposure: 0.0,
-            gamma: 2.2,
-            square_theta_h: false,
-            chroma: false,
-            channel: Channel::Rgb,
-        }
-    }
-}
-
 impl SliceLook {
-    pub(crate) fn options(&self) -> SliceOptions {
-        SliceOptions {
-            phi_d: self.phi_d.to_radians(),
-            exposure: self.exposure,
-            gamma: self.gamma,
-            square_theta_h: self.square_theta_h,
-            size: SLICE_SIZE,
-        }
-    }
-
-    /// A value as shown.
+    /// The colour that shows a value.
     fn colour(&self, value: Rgb) -> Color32 {
         let mut value = value;
         if self.chroma {
@@ -112,17 +39,27 @@ pub(crate) fn shown(x: f64, gamma: f64) -> u8 {
 
 /// Where the truth is looked up.
 #[derive(Clone, Debug)]
-pub(crate) enum Surface {
+pub(crate) enum Truth {
     Table(Arc<BrdfTable>),
-    /// Until its table is there.
+    /// The source itself, until it has been tabulated.
     Source(Arc<Source>),
 }
 
-impl Surface {
-    fn slice(&self, options: &SliceOptions) -> Option<Slice> {
+impl Truth {
+    /// The truth of a material; `None` where its source cannot be evaluated.
+    pub(crate) fn of(document: &Document) -> Option<Self> {
+        match (&document.truth, document.source_is_truth()) {
+            (Some(table), _) => Some(Self::Table(Arc::clone(table))),
+            (None, true) => Some(Self::Source(Arc::clone(&document.source))),
+            (None, false) => None,
+        }
+    }
+
+    /// What can be evaluated.
+    pub(crate) fn brdf(&self) -> Option<&dyn Brdf> {
         match self {
-            Self::Table(table) => Some(Slice::new(table.as_ref(), options)),
-            Self::Source(source) => source.brdf().map(|brdf| Slice::new(brdf, options)),
+            Self::Table(table) => Some(table.as_ref()),
+            Self::Source(source) => source.brdf(),
         }
     }
 }
@@ -133,7 +70,7 @@ pub(crate) struct SliceKey {
     pub(crate) document: DocumentId,
     pub(crate) version: u64,
     pub(crate) look: SliceLook,
-    pub(crate) truth_is_table: bool,
+    pub(crate) truth_is_tabulated: bool,
     pub(crate) has_sigma: bool,
 }
 
@@ -141,15 +78,16 @@ pub(crate) struct SliceKey {
 #[derive(Clone, Debug)]
 pub(crate) struct SliceRequest {
     pub(crate) key: SliceKey,
-    pub(crate) truth: Option<Surface>,
+    pub(crate) truth: Option<Truth>,
     pub(crate) mean: Arc<BrdfTable>,
     pub(crate) sigma: Option<Arc<BrdfTable>>,
 }
 
-/// One slice in colour; of false colours, the value at the end of the scale.
+/// One slice in colour.
 #[derive(Clone, Debug)]
-pub(crate) struct SlicePanel {
+pub(crate) struct SliceImage {
     pub(crate) image: ColorImage,
+    /// The value at the end of the scale, where the colours are false colours.
     pub(crate) limit: Option<f64>,
 }
 
@@ -157,26 +95,28 @@ pub(crate) struct SlicePanel {
 #[derive(Clone, Debug)]
 pub(crate) struct SliceImages {
     pub(crate) key: SliceKey,
-    pub(crate) panels: [Option<SlicePanel>; 4],
+    pub(crate) slices: [Option<SliceImage>; 4],
 }
 
-/// Starts the thread that makes slices, with workers of its own: those of the fitter may be busy for seconds.
-pub(crate) fn spawn(outbox: Outbox) -> std::io::Result<Sender<SliceRequest>> {
+/// Starts the thread that makes slices. It has a thread pool of its own, because the shared one may be busy
+/// with a fit for seconds.
+pub(crate) fn spawn(outbox: Outbox<Box<SliceImages>>) -> std::io::Result<Sender<SliceRequest>> {
     let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
     Mailbox::spawn("slices", move |request: SliceRequest, stale| {
         let images = pool.install(|| make(&request));
         if !stale() {
-            outbox.send(Event::Slices(Box::new(images)));
+            outbox.send(Box::new(images));
         }
     })
 }
 
-/// Makes slices; some 20 ms.
+/// Makes slices, in some 20 ms. The difference is prediction minus truth in logarithms, averaged over the
+/// shown channels: `ln(prediction + 0.001) - ln(truth + 0.001)`, with negative values taken as 0.
 pub(crate) fn make(request: &SliceRequest) -> SliceImages {
     let look = request.key.look;
     let options = look.options();
     let (truth, (mean, sigma)) = rayon::join(
-        || request.truth.as_ref().and_then(|surface| surface.slice(&options)),
+        || request.truth.as_ref().and_then(Truth::brdf).map(|brdf| Slice::new(brdf, &options)),
         || {
             rayon::join(
                 || Slice::new(request.mean.as_ref(), &options),
@@ -185,7 +125,7 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
         },
     );
     let plain =
-        |slice: &Slice| SlicePanel { image: image(slice, |i| look.colour(slice.values()[i])), limit: None };
+        |slice: &Slice| SliceImage { image: image(slice, |i| look.colour(slice.values()[i])), limit: None };
     let difference = truth.as_ref().map(|truth| {
         let log = |x: f64| (x.max(0.0) + 1e-3).ln();
         let gap: Vec<f64> = std::iter::zip(mean.values(), truth.values())
@@ -193,17 +133,17 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
             .collect();
         let limit = round_limit(&gap, mean.above_horizon());
         let image = image(truth, |i| colour(Colormap::Diverging, 0.5 + 0.5 * gap[i] / limit));
-        SlicePanel { image, limit: Some(limit) }
+        SliceImage { image, limit: Some(limit) }
     });
     let sigma = sigma.map(|slice| {
         let values: Vec<f64> = slice.values().iter().map(|&v| look.channel.of(v)).collect();
         let limit = round_limit(&values, slice.above_horizon());
         let image = image(&slice, |i| colour(Colormap::Sequential, values[i] / limit));
-        SlicePanel { image, limit: Some(limit) }
+        SliceImage { image, limit: Some(limit) }
     });
     SliceImages {
         key: request.key,
-        panels: [truth.as_ref().map(plain), Some(plain(&mean)), difference, sigma],
+        slices: [truth.as_ref().map(plain), Some(plain(&mean)), difference, sigma],
     }
 }
 
@@ -219,7 +159,8 @@ fn image(slice: &Slice, colour: impl Fn(usize) -> Color32) -> ColorImage {
     ColorImage::new([slice.size(); 2], pixels)
 }
 
-/// 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in `mask`; at least 1e-6.
+/// 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in `mask`; at least
+/// 1e-6.
 pub(crate) fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
     let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());
     let mut sizes: Vec<f64> = finite.map(|(x, _)| x.abs()).collect();

@@ -1,4 +1,5 @@
-//! Lit spheres of truth, prediction, difference and sigma in colour, coarse first, made off the window's thread.
+//! Lit spheres of truth, prediction, difference and sigma in colour, made on a thread of their own. Coarse
+//! pictures come first.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,41 +9,21 @@ use gpbrdf_core::{
     BrdfTable, Colormap, DistantLight, ENV_PATCHES, Environment, Image, ImageMetrics, POINT_LIGHT,
     SPHERE_SIZE, direction, environment_lights, exposure_of, psnr, render_sphere, ssim,
 };
-use serde::{Deserialize, Serialize};
 
+use super::mailbox::{Mailbox, Sender};
+use super::outbox::Outbox;
+use super::slices::{colour, round_limit, shown};
 use crate::viewer::state::document::DocumentId;
-use crate::viewer::work::fitter::{Event, Outbox};
-use crate::viewer::work::mailbox::{Mailbox, Sender};
-use crate::viewer::work::slices::{colour, round_limit, shown};
+use crate::viewer::state::look::SphereLight;
 
-/// Pixels along each side, at first and at last.
+/// Pixels along each side of the first and of the last pictures.
 const COARSE: usize = 96;
 const FINE: usize = 256;
-/// Lights that stand for an environment at first.
+/// Columns and rows of patches to which an environment is averaged for the first pictures.
 const COARSE_PATCHES: (usize, usize) = (24, 12);
 
-/// What lights the sphere.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub(crate) struct SphereLight {
-    /// A point light in place of the environment.
-    pub(crate) point: bool,
-    /// Where the point light stands over the disc, `x` right and `y` up.
-    pub(crate) at: [f64; 2],
-    /// How far the environment is turned about the vertical and the horizontal axis, radians.
-    pub(crate) yaw: f64,
-    pub(crate) pitch: f64,
-    /// Stops.
-    pub(crate) exposure: f64,
-}
-
-impl Default for SphereLight {
-    fn default() -> Self {
-        Self { point: false, at: [-0.45, 0.5], yaw: 0.0, pitch: 0.0, exposure: 0.0 }
-    }
-}
-
 impl SphereLight {
+    /// The distant lights of the point light or of the turned environment.
     fn lights(&self, environment: &Environment, patches: (usize, usize)) -> Vec<DistantLight> {
         if self.point {
             let [x, y] = self.at;
@@ -73,7 +54,7 @@ pub(crate) struct SphereKey {
     pub(crate) version: u64,
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
-    pub(crate) has_truth: bool,
+    pub(crate) truth_is_tabulated: bool,
     pub(crate) has_sigma: bool,
 }
 
@@ -85,36 +66,50 @@ pub(crate) struct SphereRequest {
     pub(crate) mean: Arc<BrdfTable>,
     pub(crate) sigma: Option<Arc<BrdfTable>>,
     pub(crate) environment: Arc<Environment>,
-    /// Whether the metrics of pictures are still to be found.
+    /// Whether the metrics of pictures are still unknown.
     pub(crate) wants_metrics: bool,
+}
+
+/// What the thread sends.
+#[derive(Clone, Debug)]
+pub(crate) enum SphereResult {
+    Pictures(Box<SphereImages>),
+    /// Metrics of pictures of a result.
+    Metrics {
+        document: DocumentId,
+        version: u64,
+        images: Box<ImageMetrics>,
+    },
 }
 
 /// Spheres in colour.
 #[derive(Clone, Debug)]
 pub(crate) struct SphereImages {
     pub(crate) key: SphereKey,
-    /// Whether no finer ones follow.
+    /// Whether these are the last, finest ones.
     pub(crate) fine: bool,
     pub(crate) truth: Option<ColorImage>,
     pub(crate) mean: ColorImage,
-    /// `1 - b / a` with its scale.
+    /// Prediction minus truth, see [`difference`], with the value at the end of its scale.
     pub(crate) difference: Option<(ColorImage, f64)>,
-    /// Mean of sigma over the light that a pixel sees, with its scale.
+    /// Sigma averaged over the light that a pixel sees, with the value at the end of its scale.
     pub(crate) sigma: Option<(ColorImage, f64)>,
     pub(crate) psnr: Option<f64>,
     pub(crate) ssim: Option<f64>,
-    /// The factor of radiance in the pictures.
+    /// The factor of radiance in the pictures of truth and prediction.
     pub(crate) exposure: f64,
-    /// Linear pictures, for files.
-    pub(crate) linear: Vec<(&'static str, Image)>,
+    /// Linear pictures of truth and prediction, for files.
+    pub(crate) linear_truth: Option<Image>,
+    pub(crate) linear_mean: Image,
 }
 
-/// A truth's pictures, kept while light and size stay.
+/// The picture of a truth, kept while the light and the size are the same.
 type Kept = Option<((DocumentId, SphereLight, u64, usize), Image)>;
 
-/// Starts the thread that renders, with workers of its own; beyond a coarse picture it lets the fitter go first.
+/// Starts the thread that renders. It has a thread pool of its own, and waits with finer pictures while the
+/// fitter is `busy`.
 pub(crate) fn spawn(
-    outbox: Outbox,
+    outbox: Outbox<SphereResult>,
     busy: impl Fn() -> bool + Send + Sync + 'static,
 ) -> std::io::Result<Sender<SphereRequest>> {
     let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
@@ -131,11 +126,11 @@ pub(crate) fn spawn(
             let known = &mut kept[i];
             let made = pool.install(|| make(&request, size, patches, known, stale));
             let Some(images) = made else { return };
-            outbox.send(Event::Spheres(Box::new(images)));
+            outbox.send(SphereResult::Pictures(Box::new(images)));
             let wanted = i == 1 && request.wants_metrics;
             if let Some(images) = wanted.then(|| pool.install(|| metrics(&request, stale))).flatten() {
                 let (document, version) = (request.key.document, request.key.version);
-                outbox.send(Event::Images { document, version, images: Box::new(images) });
+                outbox.send(SphereResult::Metrics { document, version, images: Box::new(images) });
             }
         }
     })
@@ -173,7 +168,7 @@ fn make(
             Color32::from_rgb(r, g, b)
         })
     };
-    let difference = truth.as_ref().map(|truth| difference(truth, &mean));
+    let difference = truth.as_ref().map(|truth| difference_disc(truth, &mean, scale));
     let sigma = request.sigma.as_ref().and_then(|table| sigma_sphere(table, &lights, stale));
     let (psnr, ssim) = match &truth {
         Some(truth) => (psnr(truth, &mean, exposure).ok(), ssim(truth, &mean, exposure).ok()),
@@ -189,26 +184,40 @@ fn make(
         psnr,
         ssim,
         exposure: scale,
-        linear: truth.map(|t| ("truth", t)).into_iter().chain([("prediction", mean)]).collect(),
+        linear_truth: truth,
+        linear_mean: mean,
     })
 }
 
-/// `1 - b / a`, averaged over R, G and B, in colour.
-fn difference(truth: &Image, mean: &Image) -> (ColorImage, f64) {
-    let gap: Vec<f64> = std::iter::zip(truth.pixels(), mean.pixels())
-        .map(|(a, b)| {
-            let ratio = |c: usize| {
-                if a[c] > 0.0 { 1.0 - f64::from(b[c]) / f64::from(a[c]) } else { 0.0 }
-            };
-            (ratio(0) + ratio(1) + ratio(2)) / 3.0
-        })
-        .collect();
+/// Prediction minus truth at each pixel, averaged over R, G and B: `exposure * (b - a)` of the linear
+/// radiances `b` of the prediction and `a` of the truth, before clipping and gamma, so that 1 is the white of
+/// the picture.
+fn difference(truth: &Image, mean: &Image, exposure: f64) -> Vec<f64> {
+    let gap = |(a, b): (&[f32; 3], &[f32; 3])| {
+        let channel = |c: usize| f64::from(b[c]) - f64::from(a[c]);
+        exposure * (channel(0) + channel(1) + channel(2)) / 3.0
+    };
+    std::iter::zip(truth.pixels(), mean.pixels()).map(gap).collect()
+}
+
+/// The difference in colour, red where the prediction is too bright, with the value at the end of the scale.
+fn difference_disc(truth: &Image, mean: &Image, exposure: f64) -> (ColorImage, f64) {
+    let gap = difference(truth, mean, exposure);
     let limit = round_limit(&gap, truth.mask());
     (disc(truth, |i| colour(Colormap::Diverging, 0.5 + 0.5 * gap[i] / limit)), limit)
 }
 
-/// Sigma averaged over the light that each pixel sees.
+/// Sigma averaged over the light that each pixel sees, in colour; of three channels the largest, as on
+/// objects.
 fn sigma_sphere(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> Option<(ColorImage, f64)> {
+    let (image, values) = mean_sigma(table, lights, stale)?;
+    let limit = round_limit(&values, image.mask());
+    Some((disc(&image, |i| colour(Colormap::Sequential, values[i] / limit)), limit))
+}
+
+/// A picture of sigma under white light, and the largest of its channels at each pixel divided by the light
+/// there; NaN where there is no light.
+fn mean_sigma(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> Option<(Image, Vec<f64>)> {
     let white: Vec<_> =
         lights.iter().map(|l| DistantLight { irradiance: [l.irradiance[1]; 3], ..*l }).collect();
     let image = render_sphere(&[table], &white, COARSE, stale)?.pop()?;
@@ -223,15 +232,15 @@ fn sigma_sphere(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) ->
     let values: Vec<f64> = (0..COARSE * COARSE)
         .map(|i| {
             let sum = total(i);
-            if image.mask()[i] && sum > 0.0 { f64::from(image.pixels()[i][0]) / sum } else { f64::NAN }
+            let largest = image.pixels()[i].into_iter().fold(0.0, f32::max);
+            if image.mask()[i] && sum > 0.0 { f64::from(largest) / sum } else { f64::NAN }
         })
         .collect();
-    let limit = round_limit(&values, image.mask());
-    Some((disc(&image, |i| colour(Colormap::Sequential, values[i] / limit)), limit))
+    Some((image, values))
 }
 
-/// A sphere picture with a soft rim: its last pixels, few of which have their middle on the sphere, are like those
-/// before them.
+/// A picture of the sphere with a soft rim. The outermost 2.5 pixels repeat the colour just inside of them,
+/// so that the rim can be antialiased.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels, and a share of 255")]
 fn disc(image: &Image, colour: impl Fn(usize) -> Color32) -> ColorImage {
     let (width, height) = (image.width(), image.height());
@@ -262,4 +271,39 @@ fn metrics(request: &SphereRequest, stale: Stale<'_>) -> Option<ImageMetrics> {
     let [x, y, z] = POINT_LIGHT;
     let point = render_sphere(&tables, &[point_light(x, y, z)], SPHERE_SIZE, stale)?;
     ImageMetrics::new((env.first()?, env.get(1)?), (point.first()?, point.get(1)?)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_prediction_minus_truth_as_exposed() {
+        let image = |pixel: [f32; 3]| Image::new(16, 16, vec![pixel; 256], vec![true; 256]).unwrap();
+        let truth = image([0.25, 0.5, 0.75]);
+        let prediction = image([0.5, 0.5, 1.25]);
+        assert_eq!(difference(&truth, &prediction, 2.0)[0], 0.5);
+        assert_eq!(difference(&prediction, &truth, 2.0)[0], -0.5);
+        // Red where the prediction is too bright, blue where it is too dark.
+        let middle = |a: &Image, b: &Image| {
+            let (picture, limit) = difference_disc(a, b, 2.0);
+            assert!((limit - 0.5).abs() < 1e-9, "{limit}");
+            picture.pixels[8 * 16 + 8]
+        };
+        let (bright, dark) = (middle(&truth, &prediction), middle(&prediction, &truth));
+        assert!(bright.r() > bright.b() && dark.b() > dark.r(), "{bright:?} {dark:?}");
+    }
+
+    #[test]
+    fn sigma_of_a_sphere_is_the_largest_of_the_channels() {
+        let table = BrdfTable::from_fn(|_| [0.125, 0.25, 0.5]);
+        let lights = [point_light(0.3, 0.2, 0.9)];
+        let (image, values) = mean_sigma(&table, &lights, &|| false).unwrap();
+        // The sphere is black at its rim, where the viewer is near the horizon.
+        let lit: Vec<f64> = values.into_iter().filter(|v| *v > 0.0).collect();
+        assert!(lit.len() > image.mask().len() / 4, "{}", lit.len());
+        for value in lit {
+            assert!((value - 0.5).abs() < 1e-3, "{value}");
+        }
+    }
 }

@@ -2,58 +2,69 @@
 
 use eframe::egui::{self, Color32, RichText, Ui};
 
-use crate::viewer::app::Viewer;
-use crate::viewer::state::document::{Document, DocumentId, Work};
-use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::ui::pane::{Order, Pane, PaneContext, Place};
+use crate::viewer::ui::shortcuts::OPEN;
 use crate::viewer::ui::widgets::section_ui;
 
-/// What the list asks for.
-enum Wish {
+/// What was clicked in the list.
+enum Click {
     Select(DocumentId),
     Solo(DocumentId),
     Remove(DocumentId),
 }
 
-impl Viewer {
-    /// The open materials: visibility, colour, name, solo, remove.
-    pub(crate) fn materials_ui(&mut self, ui: &mut Ui) {
+/// The pane of materials.
+pub(crate) struct Materials;
+
+impl Pane for Materials {
+    fn name(&self) -> &'static str {
+        "materials"
+    }
+
+    fn title(&self) -> &'static str {
+        "Materials"
+    }
+
+    fn place(&self) -> Place {
+        Place::Side
+    }
+
+    /// Visibility, colour, name, solo and removal of each material.
+    fn ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
         ui.horizontal(|ui| {
-            section_ui(ui, "Materials");
+            section_ui(ui, self.title());
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let keys = shortcuts::text(ui.ctx(), Action::Open);
-                if ui
-                    .button("Open…")
-                    .on_hover_text(format!("Files and built-in materials ({keys})"))
-                    .clicked()
-                {
-                    let ctx = ui.ctx().clone();
-                    self.act(&ctx, Action::Open);
+                let help = format!("Files and built-in materials ({})", ui.ctx().format_shortcut(&OPEN));
+                if ui.button("Open…").on_hover_text(help).clicked() {
+                    cx.order(Order::OpenWindow);
                 }
             });
         });
-        let mut wish = None;
-        let (selected, solo) = (self.selected, self.solo);
-        for document in &mut self.documents {
+        let mut click = None;
+        let (selected, solo) = (cx.documents.selected_id(), cx.documents.solo());
+        for document in cx.documents.iter_mut() {
             ui.push_id(document.id.0, |ui| {
                 let found = row_ui(ui, document, selected == Some(document.id), solo);
-                wish = found.or(wish.take());
+                click = found.or(click.take());
             });
         }
-        match wish {
-            Some(Wish::Select(id)) => self.selected = Some(id),
-            Some(Wish::Solo(id)) => self.solo = if self.solo == Some(id) { None } else { Some(id) },
-            Some(Wish::Remove(id)) => self.remove(id),
+        match click {
+            Some(Click::Select(id)) => cx.documents.select(id),
+            Some(Click::Solo(id)) => cx.documents.toggle_solo(id),
+            Some(Click::Remove(id)) => cx.order(Order::Remove(id)),
             None => {}
         }
-        if let Some(document) = self.document() {
+        if let Some(document) = cx.documents.selected() {
             ui.add_space(2.0);
             ui.label(RichText::new(&document.source.description).small());
         }
     }
 }
 
-fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<DocumentId>) -> Option<Wish> {
-    let mut wish = None;
+/// One material.
+fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<DocumentId>) -> Option<Click> {
+    let mut click = None;
     let fill =
         if selected { ui.visuals().selection.bg_fill.gamma_multiply(0.45) } else { Color32::TRANSPARENT };
     egui::Frame::new().fill(fill).corner_radius(4).inner_margin(4).show(ui, |ui| {
@@ -74,22 +85,22 @@ fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<Doc
                 let size = egui::vec2(width, ui.spacing().interact_size.y);
                 let shown = ui.allocate_ui_with_layout(size, layout, |ui| ui.add(button));
                 if shown.inner.clicked() {
-                    wish = Some(Wish::Select(document.id));
+                    click = Some(Click::Select(document.id));
                 }
             }
             let alone = solo == Some(document.id);
             let solo = ui.selectable_label(alone, "Solo").accessible_name(format!("Solo {name}"));
             if solo.on_hover_text("Draw this one alone in the plots").clicked() {
-                wish = Some(Wish::Solo(document.id));
+                click = Some(Click::Solo(document.id));
             }
             let remove = ui.button("×").accessible_name(format!("Remove {name}"));
             if remove.on_hover_text("Close this material").clicked() {
-                wish = Some(Wish::Remove(document.id));
+                click = Some(Click::Remove(document.id));
             }
-            if matches!(document.work, Work::Running { .. } | Work::Waiting) {
+            if document.is_busy() {
                 ui.spinner();
             }
         });
     });
-    wish
+    click
 }

@@ -1,60 +1,132 @@
-//! The model of the selected material: what to sample, what to fit, hyper-parameters by hand.
+//! The model of the selected material: where to measure, what to fit, hyper-parameters set by hand, metrics.
 
-use eframe::egui::{self, RichText, Ui};
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
+
+use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
 use gpbrdf_core::{Hyper, LatticeLayout, MeanFunction, Process, Symmetry};
 
-use crate::viewer::app::Viewer;
 use crate::viewer::spec::{
     KernelKind, LayoutKind, ModelSpec, SymmetryKind, TransformKind, hyper_parameters, set_hyper_parameter,
 };
 use crate::viewer::state::document::{Document, Work};
-use crate::viewer::ui::shortcuts::{self, Action};
+use crate::viewer::ui::pane::{Command, Offers, Order, Pane, PaneContext, Place, Start};
+use crate::viewer::ui::shortcuts::CANCEL;
 use crate::viewer::ui::widgets::{Number, choice_ui, reset, row_ui, section_ui, short};
+use crate::viewer::work::dialogs::{Access, Question};
+use crate::viewer::work::export;
+use crate::viewer::work::outbox::Outbox;
 
-/// The most samples of a lattice and off it.
+const OPTIMISE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::O);
+
+/// The largest numbers of samples on a lattice and of scattered samples.
 const MAX_LATTICE: f64 = 200_000.0;
 const MAX_DENSE: f64 = 4000.0;
 
-impl Viewer {
-    /// Everything about the selected material's model.
-    pub(crate) fn model_ui(&mut self, ui: &mut Ui) {
-        let ctx = ui.ctx().clone();
-        let Some(document) = self.documents.iter_mut().find(|d| Some(d.id) == self.selected) else { return };
-        section_ui(ui, "Measurements");
-        if document.is_model() {
-            ui.label("A fitted model from a file.");
-            if let Some(fitted) = &document.fitted {
-                let kind = match fitted.model.process {
-                    Process::Lattice(_) => "Exact, on a lattice",
-                    Process::Dense(_) => "Exact, dense",
-                    Process::Inducing(_) => "Compressed, on inducing lattices",
-                    _ => "Of another kind",
-                };
-                ui.label(format!("{kind}: {} numbers.", fitted.model.floats()));
-            }
-        } else if document.is_scattered() {
-            ui.label("Scattered measurements: all are used, solved densely.");
-        } else {
-            layout_ui(ui, &mut document.spec);
+/// What is wanted of the work on a model.
+enum Click {
+    Optimise,
+    Cancel,
+}
+
+/// The pane of the model.
+pub(crate) struct ModelPane {
+    /// Paths to which the model of the selected material is to be written.
+    outbox: Outbox<PathBuf>,
+    inbox: Receiver<PathBuf>,
+}
+
+impl ModelPane {
+    pub(crate) fn new(start: &Start) -> Self {
+        let (outbox, inbox) = start.channel();
+        Self { outbox, inbox }
+    }
+}
+
+impl Pane for ModelPane {
+    fn name(&self) -> &'static str {
+        "model"
+    }
+
+    fn title(&self) -> &'static str {
+        "Model"
+    }
+
+    fn place(&self) -> Place {
+        Place::Side
+    }
+
+    fn commands(&mut self, offers: &mut Offers, cx: &mut PaneContext) {
+        if offers.offer(Command::key(OPTIMISE, "Optimise the hyper-parameters"))
+            && let Some(document) = cx.documents.selected_mut()
+        {
+            document.optimise();
         }
+        if offers.offer(Command::menu("Save model…")) {
+            cx.order(Order::Ask(Question {
+                title: "Save model",
+                help: "The fitted model with its weights, as safetensors.",
+                access: Access::Write { name: "model.safetensors" },
+                answer: self.outbox.clone(),
+            }));
+        }
+    }
+
+    fn receive(&mut self, _ctx: &Context, cx: &mut PaneContext) {
+        while let Ok(path) = self.inbox.try_recv() {
+            if let Some(document) = cx.documents.selected() {
+                export::model(document, &path, &cx.saved);
+            }
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        let Some(document) = cx.documents.selected_mut() else { return };
+        section_ui(ui, "Measurements");
+        measurements_ui(ui, document);
         if !document.is_model() {
             section_ui(ui, "Gaussian process");
             let before = document.spec.clone();
             process_ui(ui, document);
             if document.spec != before {
-                // Targets or kernels of another kind: what was found for the old ones means nothing.
+                // Hyper-parameters of another kernel or of other targets would mean nothing.
                 document.spec.hyper = None;
             }
             section_ui(ui, "Hyper-parameters");
             hyper_ui(ui, document);
         }
         ui.add_space(4.0);
-        let action = work_ui(ui, document);
+        let click = work_ui(ui, document);
         section_ui(ui, "Result");
         metrics_ui(ui, document);
-        if let Some(action) = action {
-            self.act(&ctx, action);
+        match click {
+            Some(Click::Optimise) => document.optimise(),
+            Some(Click::Cancel) => {
+                let id = document.id;
+                cx.order(Order::Cancel(id));
+            }
+            None => {}
         }
+    }
+}
+
+/// What is measured, and where.
+fn measurements_ui(ui: &mut Ui, document: &mut Document) {
+    if document.is_model() {
+        ui.label("A fitted model from a file.");
+        if let Some(fitted) = &document.fitted {
+            let kind = match fitted.model.process {
+                Process::Lattice(_) => "Exact, on a lattice",
+                Process::Dense(_) => "Exact, dense",
+                Process::Inducing(_) => "Compressed, on inducing lattices",
+                _ => "Of another kind",
+            };
+            ui.label(format!("{kind}: {} numbers.", fitted.model.floats()));
+        }
+    } else if document.is_scattered() {
+        ui.label("Scattered measurements: all are used, solved densely.");
+    } else {
+        layout_ui(ui, &mut document.spec);
     }
 }
 
@@ -166,15 +238,15 @@ fn hyper_ui(ui: &mut Ui, document: &mut Document) {
 }
 
 /// What is being done, and the buttons that start and stop it.
-fn work_ui(ui: &mut Ui, document: &Document) -> Option<Action> {
-    let mut action = None;
+fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
+    let mut click = None;
     ui.horizontal(|ui| {
-        let keys = |action| shortcuts::text(ui.ctx(), action);
-        let (optimise, cancel) = (keys(Action::Optimise), keys(Action::Cancel));
+        let keys = |key| ui.ctx().format_shortcut(&key);
+        let (optimise, cancel) = (keys(OPTIMISE), keys(CANCEL));
         let button = egui::Button::new(RichText::new("Optimise").strong());
         let help = format!("Find the hyper-parameters by maximum marginal likelihood ({optimise})");
         if ui.add_enabled(!document.is_model(), button).on_hover_text(help).clicked() {
-            action = Some(Action::Optimise);
+            click = Some(Click::Optimise);
         }
         let button = egui::Button::new("Cancel");
         if ui
@@ -182,14 +254,17 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Action> {
             .on_hover_text(format!("Stop the work ({cancel})"))
             .clicked()
         {
-            action = Some(Action::Cancel);
+            click = Some(Click::Cancel);
         }
         match &document.work {
             Work::Running { stage, since, evaluations } => {
                 ui.spinner();
                 let seconds = since.elapsed().as_secs_f64();
-                let text =
-                    if *evaluations > 0 { format!("{stage} ({evaluations})") } else { (*stage).to_owned() };
+                let text = if *evaluations > 0 {
+                    format!("{} ({evaluations})", stage.name())
+                } else {
+                    stage.name().to_owned()
+                };
                 ui.label(if seconds > 1.0 { format!("{text}, {seconds:.0} s") } else { text });
             }
             Work::Waiting => {
@@ -208,7 +283,7 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Action> {
             }
         }
     });
-    action
+    click
 }
 
 fn metrics_ui(ui: &mut Ui, document: &Document) {
@@ -245,7 +320,7 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
             line(ui, "At a bound", report.at_bound.join(", "), "Hyper-parameters at the end of their range");
         }
     }
-    if document.has_truth() {
+    if document.source_is_truth() {
         let images = fitted.images.as_ref();
         let (psnr, ssim) = (images.map(|i| i.psnr_env), images.map(|i| i.ssim_env));
         line(

@@ -1,31 +1,46 @@
-//! Curves of all visible materials: lobes, angles, albedos.
+//! Curves of all visible materials: lobes, curves along the angles, albedos.
 
-use eframe::egui::{self, Color32, RichText, Ui};
-use egui_plot::{FilledArea, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
+use std::sync::mpsc::Receiver;
 
-use crate::viewer::app::Viewer;
-use crate::viewer::state::document::DocumentId;
-use crate::viewer::ui::panes::slices::{home, zoom};
-use crate::viewer::ui::widgets::{Number, focus_ui, segments_ui, short, tool_ui};
-use crate::viewer::work::curves::{ALBEDO_ANGLES, CurveKind, CurveLook, CurvePoint, curve, samples_near};
-use crate::viewer::work::slices::Channel;
+use eframe::egui::{self, Color32, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
+use egui_plot::{FilledArea, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints, PlotUi, Points};
+
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::state::look::{Channel, CurveKind, CurveLook};
+use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
+use crate::viewer::ui::pane::{
+    Command, Offers, Pane, PaneContext, Place, Share, Slot, Start, restored, saved,
+};
+use crate::viewer::ui::widgets::{Number, segments_ui, short, tool_ui};
+use crate::viewer::work::curves::{
+    ALBEDO_ANGLES, Albedo, AlbedoRequest, CurvePoint, curve, samples_near, spawn,
+};
+use crate::viewer::work::mailbox::Sender;
+
+const LOG: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::L);
+const COSINE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::C);
 
 /// What a curve was made from.
-type Key = (DocumentId, u64, bool, bool, CurveLook);
-
-/// Curves as they were last computed.
-#[derive(Debug, Default)]
-pub(crate) struct PlotCache {
-    curves: Vec<(Key, Vec<CurvePoint>, Vec<[f64; 2]>)>,
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct CurveKey {
+    document: DocumentId,
+    version: u64,
+    has_sigma: bool,
+    truth_is_tabulated: bool,
+    look: CurveLook,
 }
 
-impl PlotCache {
-    pub(crate) fn clear(&mut self) {
-        self.curves.clear();
-    }
+/// A curve and the samples near it, as they were last computed.
+struct Curve {
+    key: CurveKey,
+    points: Vec<CurvePoint>,
+    samples: Vec<[f64; 2]>,
 }
 
-/// One material's lines, ready to be drawn.
+/// The document, the version of its result and whether its truth is tabulated.
+type AlbedoKey = (DocumentId, u64, bool);
+
+/// The lines of one material, ready to be drawn.
 struct Drawn {
     name: String,
     colour: Color32,
@@ -33,82 +48,127 @@ struct Drawn {
     samples: Vec<[f64; 2]>,
 }
 
-impl Viewer {
-    /// The plot and its controls.
-    pub(crate) fn plots_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("Plots").strong().size(15.0));
-            ui.add_space(6.0);
-            let look = &mut self.settings.curves;
-            segments_ui(ui, &mut look.kind, &CurveKind::ALL, CurveKind::name);
-            ui.separator();
-            ui.checkbox(&mut look.log, "Log").on_hover_text("Logarithmic values (L)");
-            ui.checkbox(&mut look.times_cosine, "× cos θi")
-                .on_hover_text("Times the cosine of the light (C)");
-        });
-        self.where_ui(ui);
-        self.refresh_curves();
-        let look = self.settings.curves;
-        let drawn = self.drawn();
-        let lobe = look.kind == CurveKind::Lobe;
-        let log_y = look.log && !lobe;
-        let mut plot = Plot::new(("plot", look.kind, look.log))
-            .height(ui.available_height())
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .legend(Legend::default())
-            .y_axis_formatter(
-                move |mark, _| if log_y { short(10f64.powf(mark.value)) } else { short(mark.value) },
-            )
-            .label_formatter(move |at| {
-                let egui_plot::HoverPosition::NearDataPoint { plot_name, position, .. } = at else {
-                    return None;
-                };
-                let y = if log_y { 10f64.powf(position.y) } else { position.y };
-                Some(format!("{plot_name}\n{}  {}", short(position.x), short(y)))
-            });
-        plot = if lobe {
-            plot.data_aspect(1.0).x_axis_formatter(|mark, _| short(mark.value.abs())).show_grid(true)
-        } else {
-            plot.x_axis_formatter(|mark, _| format!("{}°", short(mark.value)))
-                .x_axis_label(match look.kind {
-                    CurveKind::ThetaH => "θh",
-                    CurveKind::ThetaD => "θd",
-                    CurveKind::PhiD => "φd",
-                    _ => "angle of incidence",
-                })
-                .y_axis_label(if look.kind == CurveKind::Albedo { "albedo" } else { "f, 1/sr" })
-        };
-        if self.reset_views {
+/// The pane of plots.
+pub(crate) struct Plots {
+    look: CurveLook,
+    curves: Vec<Curve>,
+    inbox: Receiver<Vec<Albedo>>,
+    worker: Sender<Vec<AlbedoRequest>>,
+    requested: Vec<AlbedoKey>,
+    albedos: Vec<Albedo>,
+}
+
+impl Plots {
+    /// Starts the worker, which integrates albedos.
+    pub(crate) fn new(start: &Start) -> std::io::Result<Self> {
+        let (outbox, inbox) = start.channel();
+        let worker = spawn(outbox)?;
+        let look = CurveLook::default();
+        Ok(Self { look, curves: Vec::new(), inbox, worker, requested: Vec::new(), albedos: Vec::new() })
+    }
+}
+
+impl Pane for Plots {
+    fn name(&self) -> &'static str {
+        "plots"
+    }
+
+    fn title(&self) -> &'static str {
+        "Plots"
+    }
+
+    fn place(&self) -> Place {
+        Place::View(Some(Share { slot: Slot::Right, tab: "Curves" }))
+    }
+
+    fn commands(&mut self, offers: &mut Offers, _cx: &mut PaneContext) {
+        if offers.offer(Command::key(LOG, "Plots: logarithmic or linear")) {
+            self.look.log ^= true;
+        }
+        if offers.offer(Command::key(COSINE, "Plots: times the cosine")) {
+            self.look.times_cosine ^= true;
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        saved(&self.look)
+    }
+
+    fn restore(&mut self, settings: &serde_json::Value) -> serde_json::Result<()> {
+        self.look = restored(settings)?;
+        Ok(())
+    }
+
+    fn receive(&mut self, _ctx: &Context, _cx: &mut PaneContext) {
+        if let Some(albedos) = self.inbox.try_iter().last() {
+            self.albedos = albedos;
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        self.tools_ui(ui);
+        self.place_ui(ui);
+        self.refresh(cx);
+        let drawn = self.drawn(cx);
+        let look = self.look;
+        let mut plot = empty_plot(&look).height(ui.available_height());
+        if cx.reset_views {
             plot = plot.reset();
         }
         let response = plot.show(ui, |plot| {
             for one in &drawn {
                 draw(plot, one, &look);
             }
-            if lobe {
+            if look.kind == CurveKind::Lobe {
                 draw_incidence(plot, &drawn, &look);
             }
-            zoom(plot);
+            navigate_plot(plot);
         });
         focus_ui(ui, &response.response);
-        self.reset_next |= home(ui, &response.response);
+        cx.reset_next |= ViewKeys::of(ui.ctx(), &response.response).reset;
         let name = format!("{} plot", look.kind.name());
-        response
-            .response
-            .widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Figure, true, &name));
+        let info = || egui::WidgetInfo::labeled(egui::accesskit::Role::Figure, true, &name);
+        response.response.widget_info(info);
     }
 
-    /// Where the curves stand.
-    fn where_ui(&mut self, ui: &mut Ui) {
-        let look = &mut self.settings.curves;
+    fn request(&mut self, cx: &mut PaneContext) {
+        if self.look.kind != CurveKind::Albedo {
+            return;
+        }
+        let requests: Vec<_> = cx.documents.visible().filter_map(AlbedoRequest::of).collect();
+        let keys: Vec<_> = requests.iter().map(|r| (r.document, r.version, r.truth.is_some())).collect();
+        if keys != self.requested {
+            self.requested = keys;
+            self.worker.put(requests);
+        }
+    }
+}
+
+impl Plots {
+    fn tools_ui(&mut self, ui: &mut Ui) {
+        let keys = |key| ui.ctx().format_shortcut(&key);
+        let (log, cosine) = (keys(LOG), keys(COSINE));
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("Plots").strong().size(15.0));
+            ui.add_space(6.0);
+            segments_ui(ui, &mut self.look.kind, &CurveKind::ALL, CurveKind::name);
+            ui.separator();
+            ui.checkbox(&mut self.look.log, "Log").on_hover_text(format!("Logarithmic values ({log})"));
+            ui.checkbox(&mut self.look.times_cosine, "× cos θi")
+                .on_hover_text(format!("Times the cosine of the light ({cosine})"));
+        });
+    }
+
+    /// Where the curves cut the BRDF, and of which channel they are.
+    fn place_ui(&mut self, ui: &mut Ui) {
+        let look = &mut self.look;
         ui.horizontal_wrapped(|ui| {
             let slider = |ui: &mut Ui, name: &str, high: f64, default: f64, value: &mut f64| {
-                let mut number = Number::new(name, 0.0..=high, default, "Where the curve stands");
+                let mut number = Number::new(name, 0.0..=high, default, "Where the curve cuts the BRDF");
                 number.suffix = "°";
                 tool_ui(ui, number, if name.len() > 8 { 260.0 } else { 200.0 }, value);
             };
-            let fixed = CurveLook::default().at;
+            let defaults = CurveLook::default().at;
             match look.kind {
                 CurveKind::Lobe => slider(ui, "Incidence θi", 89.0, 45.0, &mut look.incidence),
                 CurveKind::Albedo => {}
@@ -121,9 +181,9 @@ impl Viewer {
                     };
                     for axis in (0..3).filter(|axis| *axis != own) {
                         let high = if axis == 2 { 180.0 } else { 90.0 };
-                        slider(ui, names[axis], high, fixed[axis], &mut look.at[axis]);
+                        slider(ui, names[axis], high, defaults[axis], &mut look.at[axis]);
                     }
-                    ui.checkbox(&mut look.samples, "Samples").on_hover_text("Measurements next to the curve");
+                    ui.checkbox(&mut look.samples, "Samples").on_hover_text("Measurements near the curve");
                 }
             }
             let names = |c| if c == Channel::Rgb { "Mean" } else { Channel::name(c) };
@@ -131,68 +191,92 @@ impl Viewer {
         });
     }
 
-    /// Computes what has changed.
-    fn refresh_curves(&mut self) {
-        let look = CurveLook { log: false, samples: self.settings.curves.samples, ..self.settings.curves };
-        let keys: Vec<Key> = self
-            .visible()
-            .filter_map(|d| {
-                let fitted = d.fitted.as_ref()?;
-                Some((d.id, fitted.version, fitted.sigma.is_some(), d.truth.is_some(), look))
-            })
-            .collect();
-        let mut old = std::mem::take(&mut self.plots.curves);
-        let mut curves = Vec::new();
-        for key in keys {
-            if let Some(at) = old.iter().position(|(k, ..)| *k == key) {
-                curves.push(old.swap_remove(at));
-            } else if let Some(document) = self.documents.iter().find(|d| d.id == key.0) {
-                let samples = if look.samples { samples_near(document, &look) } else { Vec::new() };
-                let points = if look.kind == CurveKind::Albedo { Vec::new() } else { curve(document, &look) };
-                curves.push((key, points, samples));
-            }
+    /// Computes the curves that have changed and drops those that are no longer visible.
+    fn refresh(&mut self, cx: &PaneContext) {
+        // The axis is scaled when curves are drawn.
+        let look = CurveLook { log: false, ..self.look };
+        let mut old = std::mem::take(&mut self.curves);
+        for document in cx.documents.visible() {
+            let Some(fitted) = &document.fitted else { continue };
+            let key = CurveKey {
+                document: document.id,
+                version: fitted.version,
+                has_sigma: fitted.sigma.is_some(),
+                truth_is_tabulated: document.truth.is_some(),
+                look,
+            };
+            let known = old.iter().position(|curve| curve.key == key);
+            self.curves.push(known.map_or_else(|| compute(document, key), |at| old.swap_remove(at)));
         }
-        self.plots.curves = curves;
     }
 
-    fn drawn(&self) -> Vec<Drawn> {
-        let look = &self.settings.curves;
-        let named = |id: DocumentId| self.documents.iter().find(|d| d.id == id);
+    fn drawn(&self, cx: &PaneContext) -> Vec<Drawn> {
+        let look = &self.look;
+        let named = |document: &Document, points, samples| Drawn {
+            name: document.name.clone(),
+            colour: document.colour,
+            points,
+            samples,
+        };
         if look.kind == CurveKind::Albedo {
             let albedos = self.albedos.iter().filter_map(|a| {
-                let document = named(a.document).filter(|d| self.visible().any(|v| v.id == d.id))?;
+                let document = cx.documents.visible().find(|d| d.id == a.document)?;
                 let points = (0..ALBEDO_ANGLES).map(|k| CurvePoint {
                     x: 5.0 * k as f64,
                     truth: a.truth.as_ref().map(|t| look.channel.of(t[k])),
                     mean: look.channel.of(a.mean[k]),
                     band: None,
                 });
-                Some(Drawn {
-                    name: document.name.clone(),
-                    colour: document.colour,
-                    points: points.collect(),
-                    samples: Vec::new(),
-                })
+                Some(named(document, points.collect(), Vec::new()))
             });
             return albedos.collect();
         }
-        let curves = self.plots.curves.iter().filter_map(|((id, ..), points, samples)| {
-            let document = named(*id)?;
-            Some(Drawn {
-                name: document.name.clone(),
-                colour: document.colour,
-                points: points.clone(),
-                samples: samples.clone(),
-            })
+        let curves = self.curves.iter().filter_map(|curve| {
+            let document = cx.documents.get(curve.key.document)?;
+            Some(named(document, curve.points.clone(), curve.samples.clone()))
         });
         curves.collect()
     }
 }
 
+/// The curve of a document and the samples near it; the worker integrates albedos.
+fn compute(document: &Document, key: CurveKey) -> Curve {
+    let look = &key.look;
+    let samples = if look.samples { samples_near(document, look) } else { Vec::new() };
+    let points = if look.kind == CurveKind::Albedo { Vec::new() } else { curve(document, look) };
+    Curve { key, points, samples }
+}
+
+/// The plot without its curves.
+fn empty_plot(look: &CurveLook) -> Plot<'static> {
+    let lobe = look.kind == CurveKind::Lobe;
+    let log = look.log && !lobe;
+    let value = move |y: f64| short(if log { 10f64.powf(y) } else { y });
+    let plot = Plot::new(("plot", look.kind, look.log))
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .legend(Legend::default())
+        .y_axis_formatter(move |mark, _| value(mark.value))
+        .label_formatter(move |at| {
+            let HoverPosition::NearDataPoint { plot_name, position, .. } = at else { return None };
+            Some(format!("{plot_name}\n{}  {}", short(position.x), value(position.y)))
+        });
+    if lobe {
+        return plot.data_aspect(1.0).x_axis_formatter(|mark, _| short(mark.value.abs())).show_grid(true);
+    }
+    let (x, y) = match look.kind {
+        CurveKind::ThetaH => ("θh", "f, 1/sr"),
+        CurveKind::ThetaD => ("θd", "f, 1/sr"),
+        CurveKind::PhiD => ("φd", "f, 1/sr"),
+        CurveKind::Albedo | CurveKind::Lobe => ("angle of incidence", "albedo"),
+    };
+    plot.x_axis_formatter(|mark, _| format!("{}°", short(mark.value))).x_axis_label(x).y_axis_label(y)
+}
+
 /// The smallest value on logarithmic axes.
 const FLOOR: f64 = 1e-4;
 
-/// A point of a curve on the axes.
+/// The place of a point of a curve on the axes.
 fn placed(look: &CurveLook, x: f64, y: f64) -> [f64; 2] {
     match (look.kind, look.log) {
         (CurveKind::Lobe, log) => {
@@ -205,28 +289,12 @@ fn placed(look: &CurveLook, x: f64, y: f64) -> [f64; 2] {
     }
 }
 
+/// Draws the lines of one material.
 fn draw(plot: &mut PlotUi<'_>, one: &Drawn, look: &CurveLook) {
     let line = |y: &dyn Fn(&CurvePoint) -> Option<f64>| -> PlotPoints<'static> {
         one.points.iter().filter_map(|p| y(p).map(|y| placed(look, p.x, y))).collect::<Vec<_>>().into()
     };
-    let low = |p: &CurvePoint| p.band.map(|b| b.0);
-    let high = |p: &CurvePoint| p.band.map(|b| b.1);
-    if one.points.iter().any(|p| p.band.is_some()) {
-        if look.kind == CurveKind::Lobe {
-            let thin = |y: &dyn Fn(&CurvePoint) -> Option<f64>| {
-                Line::new("95 %", line(y)).color(one.colour.gamma_multiply(0.5)).width(0.7).allow_hover(false)
-            };
-            plot.line(thin(&low).name(""));
-            plot.line(thin(&high).name(""));
-        } else {
-            let band: Vec<_> = one.points.iter().filter_map(|p| p.band.map(|b| (p.x, b))).collect();
-            let xs: Vec<f64> = band.iter().map(|(x, _)| *x).collect();
-            let lows: Vec<f64> = band.iter().map(|(x, b)| placed(look, *x, b.0)[1]).collect();
-            let highs: Vec<f64> = band.iter().map(|(x, b)| placed(look, *x, b.1)[1]).collect();
-            let area = FilledArea::new("", &xs, &lows, &highs).fill_color(one.colour.gamma_multiply(0.25));
-            plot.add(area.allow_hover(false));
-        }
-    }
+    draw_interval(plot, one, look);
     if one.points.iter().any(|p| p.truth.is_some()) {
         let ink = plot.ctx().global_style().visuals.strong_text_color();
         let truth = Line::new(format!("{} (truth)", one.name), line(&|p| p.truth));
@@ -239,7 +307,29 @@ fn draw(plot: &mut PlotUi<'_>, one: &Drawn, look: &CurveLook) {
     }
 }
 
-/// The surface, its normal and the direction of the light.
+/// Draws the 95 % interval: two thin lines around a lobe, an area around other curves.
+fn draw_interval(plot: &mut PlotUi<'_>, one: &Drawn, look: &CurveLook) {
+    let band: Vec<_> = one.points.iter().filter_map(|p| p.band.map(|ends| (p.x, ends))).collect();
+    if band.is_empty() {
+        return;
+    }
+    let ends = [0, 1].map(|k| -> Vec<[f64; 2]> {
+        band.iter().map(|(x, (low, high))| placed(look, *x, [*low, *high][k])).collect()
+    });
+    if look.kind == CurveKind::Lobe {
+        for end in ends {
+            let line = Line::new("", end).color(one.colour.gamma_multiply(0.5)).width(0.7);
+            plot.line(line.allow_hover(false));
+        }
+    } else {
+        let xs: Vec<f64> = band.iter().map(|(x, _)| *x).collect();
+        let [lows, highs] = ends.map(|end| end.into_iter().map(|[_, y]| y).collect::<Vec<_>>());
+        let area = FilledArea::new("", &xs, &lows, &highs).fill_color(one.colour.gamma_multiply(0.25));
+        plot.add(area.allow_hover(false));
+    }
+}
+
+/// Draws the surface, its normal and the direction of the light.
 fn draw_incidence(plot: &mut PlotUi<'_>, drawn: &[Drawn], look: &CurveLook) {
     let most = drawn.iter().flat_map(|d| &d.points).map(|p| {
         let [x, y] = placed(look, p.x, p.mean);

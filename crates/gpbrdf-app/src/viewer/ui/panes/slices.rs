@@ -1,46 +1,53 @@
 //! Truth, prediction, difference and sigma side by side, in views that pan and zoom together.
 
 use std::f64::consts::FRAC_PI_2;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
 
-use eframe::egui::{self, Align2, Color32, RichText, TextureId, Ui};
+use eframe::egui::{self, Align2, Color32, Context, RichText, TextureHandle, Ui, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotImage, PlotPoint, PlotUi, Points};
 use gpbrdf_core::{Brdf, Colormap, HalfDiff};
+use serde::{Deserialize, Serialize};
 
-use crate::viewer::app::Viewer;
 use crate::viewer::state::document::Document;
+use crate::viewer::state::look::{Channel, SliceLook};
+use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
+use crate::viewer::ui::pane::{
+    Command, Offers, Order, Pane, PaneContext, Place, Progress, Share, Slot, Start, restored, saved,
+};
 use crate::viewer::ui::widgets::{
-    Number, ViewKeys, focus_ui, narrow, segments_ui, short, tool_ui, tools_menu_ui,
+    Number, narrow, put_texture, scale_ui, segments_ui, short, tool_ui, tools_menu_ui,
 };
 use crate::viewer::work::curves::band_at;
-use crate::viewer::work::slices::{Channel, colour};
+use crate::viewer::work::dialogs::{Access, Question};
+use crate::viewer::work::export;
+use crate::viewer::work::mailbox::Sender;
+use crate::viewer::work::outbox::Outbox;
+use crate::viewer::work::slices::{SliceImages, SliceKey, SliceRequest, Truth, spawn};
 
 /// Titles of the four views.
 const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
+/// Indices of two of them.
+const PREDICTION: usize = 1;
+const DIFFERENCE: usize = 2;
 
-/// What the colours of a view mean.
+/// What the colours of each view mean.
 const MEANINGS: [&str; 4] =
     ["f, 1/sr", "f, 1/sr", "ln(prediction + 0.001) - ln(truth + 0.001)", "standard deviation of the target"];
 
-/// What the axes take of a view.
-const AXES: egui::Vec2 = egui::vec2(72.0, 40.0);
-
+/// Room for the axes of a view.
+const AXES: egui::Vec2 = vec2(72.0, 40.0);
 /// Height of a view's title and the gap below it.
 const TITLE: f32 = 28.0;
-
-/// From this width on all tools stand in one row.
+/// A title of at least this width shows the meaning of the colours too.
+const TITLE_WITH_MEANING: f32 = 470.0;
+/// Between two views.
+const GAP: f32 = 10.0;
+/// From this width on, all tools are in one row.
 const WIDE: f32 = 780.0;
 
-/// In how many columns views are largest.
-fn columns(views: usize, area: egui::Vec2) -> usize {
-    let side = |columns: usize| {
-        let rows = views.div_ceil(columns);
-        let (columns, rows) = (narrow(columns as f64), narrow(rows as f64));
-        (area.x / columns - AXES.x).min(area.y / rows - AXES.y - TITLE)
-    };
-    (1..=views.max(1)).max_by(|a, b| side(*a).total_cmp(&side(*b))).unwrap_or(1)
-}
-
-/// Regions of a slice at phi_d = 90 degrees: name, theta_h and theta_d in degrees.
+/// Regions of a slice at `phi_d` = 90 degrees: name, `theta_h` and `theta_d` in degrees.
 const REGIONS: [(&str, f64, f64); 4] = [
     ("specular", 6.0, 45.0),
     ("Fresnel", 12.0, 84.0),
@@ -48,12 +55,99 @@ const REGIONS: [(&str, f64, f64); 4] = [
     ("grazing", 78.0, 78.0),
 ];
 
-impl Viewer {
-    /// The four slices and their controls.
-    pub(crate) fn slices_ui(&mut self, ui: &mut Ui) {
-        self.slice_tools_ui(ui);
-        let Some(document) = self.document() else { return };
-        let Some(shown) = self.slices.as_ref().filter(|s| s.key.document == document.id) else {
+/// What the pane remembers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+struct Look {
+    #[serde(flatten)]
+    slices: SliceLook,
+    samples: bool,
+    regions: bool,
+}
+
+/// What the pane is sent.
+enum Message {
+    Images(Box<SliceImages>),
+    /// Write the slices to this file.
+    Export(PathBuf),
+}
+
+/// Slices as textures.
+struct Shown {
+    key: SliceKey,
+    textures: [Option<TextureHandle>; 4],
+    limits: [Option<f64>; 4],
+}
+
+/// The pane of slices.
+pub(crate) struct Slices {
+    look: Look,
+    outbox: Outbox<Message>,
+    inbox: Receiver<Message>,
+    worker: Sender<SliceRequest>,
+    requested: Option<SliceKey>,
+    shown: Option<Shown>,
+}
+
+impl Slices {
+    /// Starts the worker.
+    pub(crate) fn new(start: &Start) -> std::io::Result<Self> {
+        let (outbox, inbox) = start.channel();
+        let worker = spawn(outbox.map(Message::Images))?;
+        Ok(Self { look: Look::default(), outbox, inbox, worker, requested: None, shown: None })
+    }
+}
+
+impl Pane for Slices {
+    fn name(&self) -> &'static str {
+        "slices"
+    }
+
+    fn title(&self) -> &'static str {
+        "Slices"
+    }
+
+    fn place(&self) -> Place {
+        Place::View(Some(Share { slot: Slot::Below, tab: "Images" }))
+    }
+
+    fn commands(&mut self, offers: &mut Offers, cx: &mut PaneContext) {
+        if offers.offer(Command::menu("Export slices…")) {
+            cx.order(Order::Ask(Question {
+                title: "Export slices",
+                help: "A PNG figure, and linear slices as EXR files beside it.",
+                access: Access::Write { name: "slices.png" },
+                answer: self.outbox.map(Message::Export),
+            }));
+        }
+    }
+
+    fn settings(&self) -> serde_json::Value {
+        saved(&self.look)
+    }
+
+    fn restore(&mut self, settings: &serde_json::Value) -> serde_json::Result<()> {
+        self.look = restored(settings)?;
+        Ok(())
+    }
+
+    fn receive(&mut self, ctx: &Context, cx: &mut PaneContext) {
+        while let Ok(message) = self.inbox.try_recv() {
+            match message {
+                Message::Images(images) => self.take(ctx, *images),
+                Message::Export(path) => {
+                    if let Some(document) = cx.documents.selected() {
+                        export::slices(document, &self.look.slices, &path, &cx.saved);
+                    }
+                }
+            }
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        self.tools_ui(ui);
+        let Some(document) = cx.documents.selected() else { return };
+        let Some(shown) = self.shown.as_ref().filter(|s| s.key.document == document.id) else {
             ui.centered_and_justified(|ui| {
                 ui.horizontal(|ui| {
                     ui.spinner();
@@ -62,49 +156,59 @@ impl Viewer {
             });
             return;
         };
-        let views: Vec<usize> = (0..4).filter(|&i| shown.textures[i].is_some()).collect();
-        let gap = 10.0;
-        let area = ui.available_size();
-        let columns = columns(views.len(), area);
-        let rows = views.len().div_ceil(columns);
-        let share = |total: f32, parts: usize| {
-            let parts = narrow(parts as f64);
-            ((total - gap * (parts - 1.0)) / parts).max(80.0)
-        };
-        let size = egui::vec2(share(area.x, columns), share(area.y, rows));
-        let (mut hovered, mut reset) = (None, false);
-        for row in views.chunks(columns) {
-            ui.horizontal_top(|ui| {
-                ui.spacing_mut().item_spacing.x = gap;
-                for &i in row {
-                    let Some(texture) = &shown.textures[i] else { continue };
-                    ui.allocate_ui(size, |ui| {
-                        ui.set_min_size(size);
-                        ui.set_max_size(size);
-                        ui.vertical(|ui| {
-                            // The topmost mark of an axis stands half a line above it.
-                            ui.spacing_mut().item_spacing.y = 8.0;
-                            let side = (size.x - AXES.x).min(size.y - AXES.y - TITLE).max(40.0);
-                            ui.scope(|ui| {
-                                ui.set_max_width(side + AXES.x - 14.0);
-                                title_ui(ui, i, shown.limits[i]);
-                            });
-                            let (point, home) = self.slice_ui(ui, document, i, texture.id());
-                            hovered = hovered.or(point);
-                            reset |= home;
-                        });
-                    });
-                }
-            });
-        }
-        if let Some(angles) = hovered {
+        let grid = Grid { look: &self.look, shown, document, reset: cx.reset_views };
+        let pointed = grid.ui(ui);
+        if let Some(angles) = pointed.angles {
             hover_ui(ui, document, angles);
         }
-        self.reset_next |= reset;
+        cx.reset_next |= pointed.home;
     }
 
-    fn slice_tools_ui(&mut self, ui: &mut Ui) {
-        let look = &mut self.settings.slices;
+    fn request(&mut self, cx: &mut PaneContext) {
+        let Some(document) = cx.documents.selected() else {
+            (self.requested, self.shown) = (None, None);
+            return;
+        };
+        let Some(fitted) = &document.fitted else { return };
+        let key = SliceKey {
+            document: document.id,
+            version: fitted.version,
+            look: self.look.slices,
+            truth_is_tabulated: document.truth.is_some(),
+            has_sigma: fitted.sigma.is_some(),
+        };
+        if self.requested == Some(key) {
+            return;
+        }
+        let (mean, sigma) = (Arc::clone(&fitted.mean), fitted.sigma.clone());
+        self.worker.put(SliceRequest { key, truth: Truth::of(document), mean, sigma });
+        self.requested = Some(key);
+    }
+
+    fn progress(&self) -> Progress {
+        let shown = self.shown.as_ref().map(|shown| shown.key);
+        if shown == self.requested { Progress::Done } else { Progress::Waiting }
+    }
+
+    fn shown_version(&self) -> Option<u64> {
+        Some(self.shown.as_ref().map_or(0, |shown| shown.key.version))
+    }
+}
+
+impl Slices {
+    fn take(&mut self, ctx: &Context, images: SliceImages) {
+        let limits = images.slices.each_ref().map(|s| s.as_ref().and_then(|s| s.limit));
+        let mut old = self.shown.take().map(|s| s.textures).unwrap_or_default();
+        let mut textures = [None, None, None, None];
+        for (i, slice) in images.slices.into_iter().enumerate() {
+            let Some(slice) = slice else { continue };
+            textures[i] = Some(put_texture(ctx, &mut old[i], format!("slice {i}"), slice.image));
+        }
+        self.shown = Some(Shown { key: images.key, textures, limits });
+    }
+
+    fn tools_ui(&mut self, ui: &mut Ui) {
+        let Look { slices: look, samples, regions } = &mut self.look;
         let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
         let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
         let wide = ui.available_width() > WIDE;
@@ -123,12 +227,11 @@ impl Viewer {
             ui.add_space(6.0);
             tools_menu_ui(ui, "Show", |ui| {
                 ui.checkbox(&mut look.square_theta_h, "Square θh")
-                    .on_hover_text("The table's own warp: more room for the specular peak");
+                    .on_hover_text("The warp of the table: more room for the specular peak");
                 ui.checkbox(&mut look.chroma, "Chroma")
                     .on_hover_text("Colours divided by their largest channel");
-                ui.checkbox(&mut self.settings.show_samples, "Samples")
-                    .on_hover_text("Where it was measured");
-                ui.checkbox(&mut self.settings.show_regions, "Regions").on_hover_text("Names of the regions");
+                ui.checkbox(samples, "Samples").on_hover_text("Where it was measured");
+                ui.checkbox(regions, "Regions").on_hover_text("Names of the regions");
                 if !wide {
                     ui.set_min_width(280.0);
                     exposure.row_ui(ui, &mut look.exposure);
@@ -137,134 +240,195 @@ impl Viewer {
             });
         });
     }
+}
 
-    /// One view; the angles under the pointer.
-    fn slice_ui(
-        &self,
-        ui: &mut Ui,
-        document: &Document,
-        i: usize,
-        texture: TextureId,
-    ) -> (Option<HalfDiff>, bool) {
-        let square = self.settings.slices.square_theta_h;
-        let phi_d = self.settings.slices.phi_d.to_radians();
+/// What the pointer and the keys say about the views.
+#[derive(Default)]
+struct Pointed {
+    /// The angles under the pointer.
+    angles: Option<HalfDiff>,
+    /// Whether the views are to be reset.
+    home: bool,
+}
+
+/// The views, in rows.
+struct Grid<'a> {
+    look: &'a Look,
+    shown: &'a Shown,
+    document: &'a Document,
+    reset: bool,
+}
+
+impl Grid<'_> {
+    fn ui(&self, ui: &mut Ui) -> Pointed {
+        let views: Vec<usize> = (0..4).filter(|&i| self.shown.textures[i].is_some()).collect();
+        let area = ui.available_size();
+        let columns = columns(views.len(), area);
+        let rows = views.len().div_ceil(columns);
+        let share = |total: f32, parts: usize| {
+            let parts = narrow(parts as f64);
+            ((total - GAP * (parts - 1.0)) / parts).max(80.0)
+        };
+        let size = vec2(share(area.x, columns), share(area.y, rows));
+        let mut pointed = Pointed::default();
+        for row in views.chunks(columns) {
+            ui.horizontal_top(|ui| {
+                ui.spacing_mut().item_spacing.x = GAP;
+                for &i in row {
+                    let Some(texture) = &self.shown.textures[i] else { continue };
+                    ui.allocate_ui(size, |ui| {
+                        ui.set_min_size(size);
+                        ui.set_max_size(size);
+                        ui.vertical(|ui| self.view_ui(ui, i, texture, size, &mut pointed));
+                    });
+                }
+            });
+        }
+        pointed
+    }
+
+    /// One view with its title.
+    fn view_ui(&self, ui: &mut Ui, i: usize, texture: &TextureHandle, size: egui::Vec2, out: &mut Pointed) {
+        // The topmost mark of an axis reaches half a line above it.
+        ui.spacing_mut().item_spacing.y = 8.0;
+        let side = (size.x - AXES.x).min(size.y - AXES.y - TITLE).max(40.0);
+        ui.scope(|ui| {
+            ui.set_max_width(side + AXES.x - 14.0);
+            title_ui(ui, i, self.shown.limits[i]);
+        });
         let room = ui.available_size();
         let side = (room.x - AXES.x).min(room.y - AXES.y).max(40.0);
-        let mut plot = Plot::new(("slice", i))
-            .link_axis(egui::Id::unique("slices"), true)
-            .link_cursor(egui::Id::unique("slices"), true)
-            .data_aspect(1.0)
-            .width(side + AXES.x - 14.0)
-            .height(side + AXES.y)
-            .set_margin_fraction(egui::vec2(0.0, 0.0))
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .allow_axis_zoom_drag(false)
-            .show_x(false)
-            .show_y(false)
-            .show_grid(false)
-            .clamp_grid(true)
-            .x_grid_spacer(move |input| degrees_marks(&input, square))
-            .y_grid_spacer(|input| degrees_marks(&input, false))
-            .label_formatter(|_| None)
-            .custom_x_axes(vec![
-                AxisHints::new_x()
-                    .formatter(move |mark, _| {
-                        format!("{}°", short(if square { unwarped(mark.value) } else { mark.value }))
-                    })
-                    .label_spacing(egui::Rangef::new(22.0, 30.0))
-                    .label("θh"),
-            ])
-            .custom_y_axes(vec![
-                AxisHints::new_y()
-                    .formatter(|mark, _| format!("{}°", short(mark.value)))
-                    .label("θd")
-                    .min_thickness(AXES.x - 36.0),
-            ]);
-        if self.reset_views {
+        let mut plot = slice_plot(i, side, self.look.slices.square_theta_h);
+        if self.reset {
             plot = plot.reset();
         }
-        let show_samples = self.settings.show_samples;
-        let regions = self.settings.show_regions;
-        let place = move |theta_h: f64| if square { warped(theta_h) } else { theta_h };
-        let samples = if show_samples { sample_points(document, phi_d, place) } else { Vec::new() };
         let response = plot.show(ui, |plot| {
-            let image = PlotImage::new(TITLES[i], texture, PlotPoint::new(45.0, 45.0), [90.0, 90.0]);
+            let image = PlotImage::new(TITLES[i], texture.id(), PlotPoint::new(45.0, 45.0), [90.0, 90.0]);
             plot.image(image.allow_hover(false));
-            if !samples.is_empty() {
-                let points =
-                    Points::new("samples", samples).radius(1.6).color(document.colour).allow_hover(false);
-                plot.points(points);
-            }
-            if regions {
-                for (name, theta_h, theta_d) in REGIONS {
-                    let text = RichText::new(name)
-                        .color(Color32::WHITE)
-                        .background_color(Color32::from_black_alpha(150));
-                    let at = PlotPoint::new(place(theta_h), theta_d);
-                    let anchor = if theta_h < 20.0 { Align2::LEFT_CENTER } else { Align2::CENTER_CENTER };
-                    plot.text(egui_plot::Text::new(name, at, text).anchor(anchor).allow_hover(false));
-                }
-            }
-            zoom(plot);
+            self.draw_samples(plot);
+            self.draw_regions(plot);
+            navigate_plot(plot);
             plot.pointer_coordinate().filter(|_| plot.response().hovered())
         });
         focus_ui(ui, &response.response);
         let name = format!("{} slice", TITLES[i]);
-        response
-            .response
-            .widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name));
-        let home = home(ui, &response.response);
-        let Some(at) = response.inner else { return (None, home) };
+        let info = || egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name);
+        response.response.widget_info(info);
+        out.home |= ViewKeys::of(ui.ctx(), &response.response).reset;
+        out.angles = out.angles.or(response.inner.and_then(|at| self.angles(at)));
+    }
+
+    fn draw_samples(&self, plot: &mut PlotUi<'_>) {
+        if !self.look.samples {
+            return;
+        }
+        let phi_d = self.look.slices.phi_d.to_radians();
+        let samples = sample_points(self.document, phi_d, |theta_h| self.place(theta_h));
+        if !samples.is_empty() {
+            let points = Points::new("samples", samples).radius(1.6).color(self.document.colour);
+            plot.points(points.allow_hover(false));
+        }
+    }
+
+    fn draw_regions(&self, plot: &mut PlotUi<'_>) {
+        if !self.look.regions {
+            return;
+        }
+        for (name, theta_h, theta_d) in REGIONS {
+            let shade = Color32::from_black_alpha(150);
+            let text = RichText::new(name).color(Color32::WHITE).background_color(shade);
+            let at = PlotPoint::new(self.place(theta_h), theta_d);
+            let anchor = if theta_h < 20.0 { Align2::LEFT_CENTER } else { Align2::CENTER_CENTER };
+            plot.text(egui_plot::Text::new(name, at, text).anchor(anchor).allow_hover(false));
+        }
+    }
+
+    /// The place of `theta_h`, in degrees, on the axis.
+    fn place(&self, theta_h: f64) -> f64 {
+        if self.look.slices.square_theta_h { warped(theta_h) } else { theta_h }
+    }
+
+    /// The angles at a point of a view; `None` outside of the slice.
+    fn angles(&self, at: PlotPoint) -> Option<HalfDiff> {
         let x = at.x / 90.0;
-        let theta_h = if square { x * x.abs() } else { x } * FRAC_PI_2;
+        let theta_h = if self.look.slices.square_theta_h { x * x.abs() } else { x } * FRAC_PI_2;
         let theta_d = at.y / 90.0 * FRAC_PI_2;
         let inside = (0.0..=FRAC_PI_2).contains(&theta_h) && (0.0..=FRAC_PI_2).contains(&theta_d);
-        (inside.then_some(HalfDiff { theta_h, theta_d, phi_d }), home)
+        inside.then_some(HalfDiff { theta_h, theta_d, phi_d: self.look.slices.phi_d.to_radians() })
     }
 }
 
-/// Wheel and right drag zoom, as viewers of BRDFs do.
-pub(crate) fn zoom(plot: &mut PlotUi<'_>) {
-    let response = plot.response().clone();
-    let ctx = plot.ctx().clone();
-    let mut factor = 1.0;
-    if response.hovered() {
-        factor *= (0.004 * ctx.input(|i| i.smooth_scroll_delta().y)).exp();
-    }
-    if response.dragged_by(egui::PointerButton::Secondary) {
-        factor *= (0.01 * (response.drag_delta().x - response.drag_delta().y)).exp();
-    }
-    if (factor - 1.0).abs() > 1e-6 {
-        plot.zoom_bounds_around_hovered(egui::Vec2::splat(factor));
-    }
-    let keys = ViewKeys::of(&ctx, &response);
-    if keys.right != 0.0 || keys.up != 0.0 {
-        let bounds = plot.plot_bounds();
-        let step = [0.1 * keys.right * bounds.width(), 0.1 * keys.up * bounds.height()];
-        plot.translate_bounds(egui::Vec2::from(step.map(narrow)));
-    }
-    if keys.zoom != 1.0 {
-        plot.zoom_bounds(egui::Vec2::splat(narrow(keys.zoom)), plot.plot_bounds().center());
-    }
+/// The number of columns in which views are largest.
+fn columns(views: usize, area: egui::Vec2) -> usize {
+    let side = |columns: usize| {
+        let rows = views.div_ceil(columns);
+        let (columns, rows) = (narrow(columns as f64), narrow(rows as f64));
+        (area.x / columns - AXES.x).min(area.y / rows - AXES.y - TITLE)
+    };
+    (1..=views.max(1)).max_by(|a, b| side(*a).total_cmp(&side(*b))).unwrap_or(1)
 }
 
-/// Whether a view that has the focus is to be reset.
-pub(crate) fn home(ui: &Ui, response: &egui::Response) -> bool {
-    ViewKeys::of(ui.ctx(), response).reset
+/// The empty plot of a view: `theta_h` to the right, `theta_d` up, both in degrees.
+fn slice_plot(i: usize, side: f32, square: bool) -> Plot<'static> {
+    let degrees =
+        move |mark: GridMark| format!("{}°", short(if square { unwarped(mark.value) } else { mark.value }));
+    let theta_h = AxisHints::new_x().formatter(move |mark, _| degrees(mark)).label("θh");
+    let theta_d = AxisHints::new_y().formatter(|mark, _| format!("{}°", short(mark.value))).label("θd");
+    Plot::new(("slice", i))
+        .link_axis(egui::Id::unique("slices"), true)
+        .link_cursor(egui::Id::unique("slices"), true)
+        .data_aspect(1.0)
+        .width(side + AXES.x - 14.0)
+        .height(side + AXES.y)
+        .set_margin_fraction(vec2(0.0, 0.0))
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .show_x(false)
+        .show_y(false)
+        .show_grid(false)
+        .clamp_grid(true)
+        .x_grid_spacer(move |input| degrees_marks(&input, square))
+        .y_grid_spacer(|input| degrees_marks(&input, false))
+        .label_formatter(|_| None)
+        .custom_x_axes(vec![theta_h.label_spacing(egui::Rangef::new(22.0, 30.0))])
+        .custom_y_axes(vec![theta_d.min_thickness(AXES.x - 36.0)])
 }
 
-/// Where degrees of theta_h stand on an axis with the table's warp.
+/// The title of a view, with the scale of its false colours.
+fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
+    ui.horizontal(|ui| {
+        let wide = ui.available_width() >= TITLE_WITH_MEANING;
+        ui.label(RichText::new(TITLES[i]).strong()).on_hover_text(MEANINGS[i]);
+        if wide && i > PREDICTION {
+            ui.label(RichText::new(MEANINGS[i]).small());
+        }
+        let Some(limit) = limit else { return };
+        let (map, low, high) = if i == DIFFERENCE {
+            (Colormap::Diverging, format!("-{}", short(limit)), format!("+{}", short(limit)))
+        } else {
+            (Colormap::Sequential, "0".to_owned(), short(limit))
+        };
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.label(RichText::new(high).small());
+            scale_ui(ui, map);
+            ui.label(RichText::new(low).small());
+        });
+    });
+}
+
+/// The place of degrees of `theta_h` on an axis with the warp of the table.
 fn warped(degrees: f64) -> f64 {
     90.0 * (degrees / 90.0).max(0.0).sqrt()
 }
 
-/// Degrees of theta_h at a place of an axis with the table's warp.
+/// Degrees of `theta_h` at a place of an axis with the warp of the table.
 fn unwarped(place: f64) -> f64 {
     place * place.abs() / 90.0
 }
 
-/// Marks at round degrees: every 5 or 30, of a warped axis denser where it is wider.
+/// Marks at round degrees: at every 5 or 30, and denser on the wider part of a warped axis.
 fn degrees_marks(input: &GridInput, warp: bool) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let near = high - low < 40.0;
@@ -280,46 +444,10 @@ fn degrees_marks(input: &GridInput, warp: bool) -> Vec<GridMark> {
     inside.map(|value| GridMark { value, step_size: step }).collect()
 }
 
-fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(TITLES[i]).strong()).on_hover_text(MEANINGS[i]);
-        let Some(limit) = limit else { return };
-        let map = if i == 2 { Colormap::Diverging } else { Colormap::Sequential };
-        let low = if i == 2 { format!("-{}", short(limit)) } else { "0".to_owned() };
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            let end = if i == 2 { format!("+{}", short(limit)) } else { short(limit) };
-            ui.label(RichText::new(end).small());
-            scale_ui(ui, map);
-            ui.label(RichText::new(low).small());
-        });
-    });
-}
-
-/// A colour bar.
-pub(crate) fn scale_ui(ui: &mut Ui, map: Colormap) {
-    let (rect, _) = ui.allocate_exact_size(egui::vec2(72.0, 9.0), egui::Sense::hover());
-    let mut mesh = egui::Mesh::default();
-    let steps: u16 = 24;
-    for k in 0..=steps {
-        let t = f64::from(k) / f64::from(steps);
-        let x = egui::lerp(rect.left()..=rect.right(), narrow(t));
-        let fill = colour(map, t);
-        mesh.colored_vertex(egui::pos2(x, rect.top()), fill);
-        mesh.colored_vertex(egui::pos2(x, rect.bottom()), fill);
-        if k > 0 {
-            let v = 2 * u32::from(k);
-            mesh.add_triangle(v - 2, v - 1, v);
-            mesh.add_triangle(v - 1, v, v + 1);
-        }
-    }
-    ui.painter().add(mesh);
-}
-
-/// The samples that stand next to the slice.
+/// The places of the samples that are near the slice.
 fn sample_points(document: &Document, phi_d: f64, place: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let Some(fitted) = &document.fitted else { return Vec::new() };
-    // The nodes next to the slice: half a step of a lattice's phi_d.
+    // Near means within half a step of `phi_d` of a lattice.
     let width = match &fitted.samples.lattice {
         Some(lattice) => 0.51 * FRAC_PI_2 / lattice.shape[2] as f64,
         None => 5f64.to_radians(),
@@ -329,8 +457,8 @@ fn sample_points(document: &Document, phi_d: f64, place: impl Fn(f64) -> f64) ->
     near.take(6000).map(|a| [place(a.theta_h.to_degrees()), a.theta_d.to_degrees()]).collect()
 }
 
-/// What is known about a pair of directions.
-pub(crate) fn hover_lines(document: &Document, angles: HalfDiff) -> Vec<(&'static str, String)> {
+/// The values at a pair of directions, with their names.
+fn hover_lines(document: &Document, angles: HalfDiff) -> Vec<(&'static str, String)> {
     let degrees = |x: f64| format!("{:.2}°", x.to_degrees());
     let mut lines =
         vec![("θh", degrees(angles.theta_h)), ("θd", degrees(angles.theta_d)), ("φd", degrees(angles.phi_d))];
@@ -339,12 +467,7 @@ pub(crate) fn hover_lines(document: &Document, angles: HalfDiff) -> Vec<(&'stati
         return lines;
     }
     let rgb = |v: [f64; 3]| v.map(short).join("  ");
-    let truth = match &document.truth {
-        Some(table) => Some(table.eval_half_diff(angles)),
-        None if document.has_truth() => document.source.brdf().map(|b| b.eval_half_diff(angles)),
-        None => None,
-    };
-    if let Some(truth) = truth {
+    if let Some(truth) = document.truth_at(angles) {
         lines.push(("truth", rgb(truth)));
     }
     if let Some(fitted) = &document.fitted {
@@ -360,6 +483,7 @@ pub(crate) fn hover_lines(document: &Document, angles: HalfDiff) -> Vec<(&'stati
     lines
 }
 
+/// The values under the pointer.
 fn hover_ui(ui: &Ui, document: &Document, angles: HalfDiff) {
     egui::Tooltip::always_open(
         ui.ctx().clone(),
@@ -384,7 +508,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn marks_of_a_warped_axis_stand_at_round_degrees() {
+    fn marks_of_a_warped_axis_are_at_round_degrees() {
         let input = GridInput { bounds: (0.0, 90.0), base_step_size: 1.0 };
         let degrees = |warp: bool| -> Vec<f64> {
             let marks = degrees_marks(&input, warp);

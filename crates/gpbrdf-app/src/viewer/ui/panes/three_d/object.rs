@@ -1,84 +1,148 @@
-//! Objects lit on the device: truth and prediction either side of a line or side by side, their difference, sigma.
+//! Objects, which are lit on the graphics device.
 
-use eframe::egui::{self, Align2, Color32, Rect, RichText, Ui, pos2, vec2};
+use std::sync::Arc;
+
+use eframe::egui::{self, Align2, Color32, Context, Rect, RichText, TextureHandle, Ui, pos2, vec2};
 use gpbrdf_core::Colormap;
 
-use crate::viewer::app::{ShownScene, Viewer};
-use crate::viewer::state::settings::SphereShown;
-use crate::viewer::ui::panes::slices::scale_ui;
-use crate::viewer::ui::panes::three_d::sphere::{psnr_text, square};
-use crate::viewer::ui::widgets::{ViewKeys, focus_ui, narrow, short};
-use crate::viewer::work::scene::{LIMIT, Orbit};
+use super::{DIFFERENCE, Map, corners, sphere, square, whole_ui};
+use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::state::look::{Orbit, SceneLook, Shape, SphereShown};
+use crate::viewer::ui::navigate::{DRAG_ORBIT, KEY_TURN, ViewKeys};
+use crate::viewer::ui::pane::{PaneContext, Start};
+use crate::viewer::ui::widgets::{narrow, psnr_text, put_texture, scale_ui, short};
+use crate::viewer::work::mailbox::Sender;
+use crate::viewer::work::outbox::Outbox;
+use crate::viewer::work::quality::Quality;
+use crate::viewer::work::scene::{LIMIT, SceneImage, SceneKey, SceneRequest, SceneResult, spawn};
 
 /// Between two pictures side by side.
 const GAP: f32 = 4.0;
 
-impl Viewer {
-    /// An object: left drag orbits, right drag and wheel zoom, Ctrl + drag turns the light.
-    pub(crate) fn object_ui(&mut self, ui: &mut Ui, response: &egui::Response, area: Rect) {
+/// An object as textures.
+struct Shown {
+    document: DocumentId,
+    picture: u64,
+    texture: TextureHandle,
+    /// The prediction, where `texture` is the truth alone.
+    beside: Option<TextureHandle>,
+    samples: u32,
+}
+
+/// The object with its worker.
+pub(super) struct ObjectView {
+    /// `None` once the view is closed.
+    worker: Option<Sender<SceneRequest>>,
+    requested: Option<SceneKey>,
+    shown: Option<Shown>,
+    pub(super) quality: Option<Quality>,
+    /// Pixels of one picture, where the object was drawn in this frame.
+    size: Option<[u32; 2]>,
+}
+
+impl ObjectView {
+    /// Starts the worker, on `device` or else on a device that it opens.
+    pub(super) fn new(
+        outbox: Outbox<SceneResult>,
+        device: Option<gpbrdf_render::Context>,
+        start: &Start,
+    ) -> std::io::Result<Self> {
+        let worker = Some(spawn(outbox, device, start.busy())?);
+        Ok(Self { worker, requested: None, shown: None, quality: None, size: None })
+    }
+
+    /// Shows a picture in place of an older one.
+    pub(super) fn take(&mut self, ctx: &Context, new: SceneImage) {
+        let (first, second) = self.shown.take().map_or((None, None), |s| (Some(s.texture), s.beside));
+        let texture = put_texture(ctx, &mut { first }, "object".to_owned(), new.image);
+        let put_beside = |image| put_texture(ctx, &mut { second }, "object beside".to_owned(), image);
+        let beside = new.beside.map(put_beside);
+        let (document, picture, samples) = (new.document, new.picture, new.samples);
+        self.shown = Some(Shown { document, picture, texture, beside, samples });
+    }
+
+    /// Drops what is shown, so that it is requested again.
+    pub(super) fn clear(&mut self) {
+        (self.shown, self.quality, self.requested) = (None, None, None);
+    }
+
+    /// Ends the worker. The graphics driver must not be unloaded while it runs.
+    pub(super) fn close(&mut self) {
+        if let Some(worker) = self.worker.take() {
+            worker.join();
+        }
+    }
+
+    /// Requests pictures of the selected material if the object is shown and anything has changed on which
+    /// they depend.
+    pub(super) fn request(&mut self, cx: &PaneContext, look: &SceneLook, map: &Map, exposure: f64) {
+        let (Some(worker), Some(size)) = (&self.worker, self.size.take()) else { return };
+        if look.shape == Shape::Sphere {
+            return;
+        }
+        let Some(document) = cx.documents.selected() else { return };
+        let Some(fitted) = &document.fitted else { return };
+        let key = SceneKey {
+            document: document.id,
+            version: fitted.version,
+            truth_is_tabulated: document.truth.is_some(),
+            has_sigma: fitted.sigma.is_some(),
+            shape: look.shape.clone(),
+            orbit: look.orbit,
+            light: look.light,
+            environment: map.number,
+            exposure: narrow(exposure),
+            size,
+            shown: look.shown,
+            swipe: look.swipe,
+        };
+        if self.requested.as_ref() == Some(&key) {
+            return;
+        }
+        worker.put(SceneRequest {
+            key: key.clone(),
+            truth: document.truth.clone(),
+            mean: Arc::clone(&fitted.mean),
+            sigma: fitted.sigma.clone(),
+            environment: Arc::clone(&map.environment),
+        });
+        self.requested = Some(key);
+    }
+
+    /// Draws the object of a material; where its picture is, or the left one of two.
+    pub(super) fn ui(&mut self, ui: &mut Ui, area: Rect, look: &SceneLook, document: &Document) -> Rect {
         let picture = area.shrink(6.0);
-        let has_truth = self.document().is_some_and(|d| d.truth.is_some());
-        let pair = has_truth && self.settings.sphere == SphereShown::SideBySide;
+        let truth_is_tabulated = document.truth.is_some();
         let (left, right) = halves(picture);
+        let pair = truth_is_tabulated && look.shown == SphereShown::SideBySide;
         let one = if pair { left } else { picture };
         let scale = ui.pixels_per_point().min(1.25);
-        self.scene_size = [one.width(), one.height()].map(|x| pixels(x * scale));
-        let Some(id) = self.document().map(|d| d.id) else { return };
-        if let Some(scene) = self.scene.as_ref().filter(|s| s.document == id) {
-            let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            match &scene.beside {
+        self.size = Some([one.width(), one.height()].map(|x| pixels(x * scale)));
+        if let Some(shown) = self.shown.as_ref().filter(|s| s.document == document.id) {
+            match &shown.beside {
                 Some(beside) => {
-                    ui.painter().image(scene.texture.id(), left, uv, Color32::WHITE);
-                    ui.painter().image(beside.id(), right, uv, Color32::WHITE);
+                    whole_ui(ui, &shown.texture, left, picture);
+                    whole_ui(ui, beside, right, picture);
                 }
-                None => {
-                    ui.painter().image(scene.texture.id(), picture, uv, Color32::WHITE);
-                }
+                None => whole_ui(ui, &shown.texture, picture, picture),
             }
-            self.captions_ui(ui, picture, has_truth);
-            self.foot_ui(ui, picture, scene, has_truth);
+            captions_ui(ui, picture, look, truth_is_tabulated);
+            self.footer_ui(ui, picture, shown, look.shown, truth_is_tabulated);
         } else {
             ui.put(area, egui::Spinner::new().size(28.0));
         }
-        self.orbit_drag(ui, response, if pair { left } else { picture });
+        one
     }
 
-    fn captions_ui(&self, ui: &Ui, picture: Rect, has_truth: bool) {
-        let label = |x: f32, align: Align2, text: &str| {
-            let at = pos2(x, picture.top() + 6.0);
-            let font = egui::FontId::proportional(13.0);
-            ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
-            ui.painter().text(at, align, text, font, Color32::WHITE);
-        };
-        let from_left = |text: &str| label(picture.left() + 8.0, Align2::LEFT_TOP, text);
-        match self.settings.sphere {
-            SphereShown::Sigma => from_left("Sigma"),
-            SphereShown::Difference if has_truth => from_left("1 - prediction / truth"),
-            SphereShown::Swipe if has_truth => {
-                let x = egui::lerp(picture.left()..=picture.right(), self.settings.swipe);
-                let stroke = egui::Stroke::new(1.5, Color32::from_white_alpha(200));
-                ui.painter().line_segment([pos2(x, picture.top()), pos2(x, picture.bottom())], stroke);
-                from_left("Truth");
-                label(picture.right() - 8.0, Align2::RIGHT_TOP, "Prediction");
-            }
-            SphereShown::SideBySide if has_truth => {
-                let (left, right) = halves(picture);
-                label(left.center().x, Align2::CENTER_TOP, "Truth");
-                label(right.center().x, Align2::CENTER_TOP, "Prediction");
-            }
-            _ => from_left("Prediction"),
-        }
-    }
-
-    /// Scale, metrics and how smooth the picture is.
-    fn foot_ui(&self, ui: &mut Ui, picture: Rect, scene: &ShownScene, has_truth: bool) {
+    /// The scale of false colours, metrics, and how many samples per pixel there are.
+    fn footer_ui(&self, ui: &mut Ui, picture: Rect, shown: &Shown, mode: SphereShown, compared: bool) {
         let rect = Rect::from_min_max(picture.left_bottom() + vec2(6.0, -30.0), picture.max - vec2(6.0, 6.0));
-        let scale = match self.settings.sphere {
-            SphereShown::Difference if has_truth => Some((Colormap::Diverging, -f64::from(LIMIT))),
+        let scale = match mode {
+            SphereShown::Difference if compared => Some((Colormap::Diverging, -f64::from(LIMIT))),
             SphereShown::Sigma => Some((Colormap::Sequential, 0.0)),
             _ => None,
         };
-        let quality = self.quality.filter(|q| q.document == scene.document && has_truth);
+        let quality = self.quality.filter(|q| q.document == shown.document && compared);
         ui.scope_builder(egui::UiBuilder::new().max_rect(rect).id_salt("object footer"), |ui| {
             let back = egui::Frame::new().fill(Color32::from_black_alpha(170)).corner_radius(4);
             back.inner_margin(egui::Margin::symmetric(6, 2)).show(ui, |ui| {
@@ -89,43 +153,75 @@ impl Viewer {
                         scale_ui(ui, map);
                         ui.label(short(f64::from(LIMIT)));
                     }
-                    let many = |n: u32| if n == 1 { "1 sample".to_owned() } else { format!("{n} samples") };
-                    if let Some(quality) = quality {
-                        ui.label(RichText::new(psnr_text(quality.psnr)).strong());
-                        ui.label(format!("SSIM {:.4} at {}", quality.ssim, many(quality.samples)));
-                    }
-                    let measured = quality.is_some_and(|q| q.picture == scene.picture);
-                    if !measured || quality.is_some_and(|q| q.samples != scene.samples) {
-                        ui.label(format!("{} shown", many(scene.samples)));
-                    }
+                    quality_ui(ui, quality, shown);
                 });
             });
         });
     }
+}
 
-    fn orbit_drag(&mut self, ui: &Ui, response: &egui::Response, picture: Rect) {
-        let modifiers = ui.input(|i| i.modifiers);
-        if response.double_clicked() {
-            self.settings.orbit = Orbit::default();
-            self.settings.swipe = 0.5;
-        } else if modifiers.command || modifiers.shift {
-            self.sphere_drag(ui, response, if modifiers.shift { picture } else { square(picture) });
-        } else if response.dragged_by(egui::PointerButton::Primary) {
-            let orbit = &mut self.settings.orbit;
-            orbit.azimuth -= response.drag_delta().x * 0.008;
-            orbit.elevation = (orbit.elevation + response.drag_delta().y * 0.008).clamp(-1.5, 1.5);
-        }
-        self.zoom_drag(ui, response);
-        focus_ui(ui, response);
-        let keys = ViewKeys::of(ui.ctx(), response);
-        let orbit = &mut self.settings.orbit;
-        orbit.azimuth -= narrow(0.1 * keys.right);
-        orbit.elevation = (orbit.elevation + narrow(0.1 * keys.up)).clamp(-1.5, 1.5);
-        self.view_keys(&keys);
+/// The metrics, and the samples of the picture where those of the metrics are others.
+fn quality_ui(ui: &mut Ui, quality: Option<Quality>, shown: &Shown) {
+    let count = |n: u32| if n == 1 { "1 sample".to_owned() } else { format!("{n} samples") };
+    if let Some(quality) = quality {
+        ui.label(RichText::new(psnr_text(quality.psnr)).strong());
+        ui.label(format!("SSIM {:.4} at {}", quality.ssim, count(quality.samples)));
+    }
+    let same = quality.is_some_and(|q| q.picture == shown.picture && q.samples == shown.samples);
+    if !same {
+        ui.label(format!("{} shown", count(shown.samples)));
     }
 }
 
-/// Where two pictures stand side by side.
+/// What the pictures show, and the line between truth and prediction.
+fn captions_ui(ui: &Ui, picture: Rect, look: &SceneLook, compared: bool) {
+    let [left, right] = corners(picture, vec2(8.0, 6.0));
+    let label = |at: egui::Pos2, align: Align2, text: &str| {
+        let font = egui::FontId::proportional(13.0);
+        ui.painter().text(at + vec2(1.0, 1.0), align, text, font.clone(), Color32::BLACK);
+        ui.painter().text(at, align, text, font, Color32::WHITE);
+    };
+    match look.shown {
+        SphereShown::Sigma => label(left, Align2::LEFT_TOP, "Sigma"),
+        SphereShown::Difference if compared => label(left, Align2::LEFT_TOP, DIFFERENCE),
+        SphereShown::Swipe if compared => {
+            let x = egui::lerp(picture.left()..=picture.right(), look.swipe);
+            let stroke = egui::Stroke::new(1.5, Color32::from_white_alpha(200));
+            ui.painter().line_segment([pos2(x, picture.top()), pos2(x, picture.bottom())], stroke);
+            label(left, Align2::LEFT_TOP, "Truth");
+            label(right, Align2::RIGHT_TOP, "Prediction");
+        }
+        SphereShown::SideBySide if compared => {
+            let (first, second) = halves(picture);
+            for (half, text) in [(first, "Truth"), (second, "Prediction")] {
+                label(pos2(half.center().x, left.y), Align2::CENTER_TOP, text);
+            }
+        }
+        _ => label(left, Align2::LEFT_TOP, "Prediction"),
+    }
+}
+
+/// Left drag orbits; with Ctrl it turns the light, with Shift it moves the line between truth and prediction.
+/// A double click resets.
+pub(super) fn drag(ui: &Ui, response: &egui::Response, look: &mut SceneLook, picture: Rect) {
+    let modifiers = ui.input(|i| i.modifiers);
+    if response.double_clicked() {
+        (look.orbit, look.swipe) = (Orbit::default(), 0.5);
+    } else if modifiers.command || modifiers.shift {
+        let disc = if modifiers.shift { picture } else { square(picture) };
+        sphere::drag_light(ui, response, look, disc);
+    } else if response.dragged_by(egui::PointerButton::Primary) {
+        let delta = response.drag_delta() * DRAG_ORBIT;
+        look.orbit.turn(-delta.x, delta.y);
+    }
+}
+
+/// Arrow keys orbit.
+pub(super) fn turn_by_keys(look: &mut SceneLook, keys: &ViewKeys) {
+    look.orbit.turn(-narrow(KEY_TURN * keys.right), narrow(KEY_TURN * keys.up));
+}
+
+/// The places of two pictures side by side.
 fn halves(picture: Rect) -> (Rect, Rect) {
     let (left, right) = picture.split_left_right_at_fraction(0.5);
     (left.with_max_x(left.max.x - 0.5 * GAP), right.with_min_x(right.min.x + 0.5 * GAP))
