@@ -40,8 +40,9 @@ const MEANINGS: [&str; 4] =
 const AXES: egui::Vec2 = vec2(72.0, 40.0);
 /// Height of a view's title and the gap below it.
 const TITLE: f32 = 28.0;
-/// A title of at least this width shows the meaning of the colours too.
-const TITLE_WITH_MEANING: f32 = 470.0;
+/// Titles of at least these widths have room for the whole and for the short meaning of the false colours.
+const WITH_MEANING: f32 = 470.0;
+const WITH_SHORT_MEANING: f32 = 380.0;
 /// Between two views.
 const GAP: f32 = 10.0;
 /// From this width on, all tools are in one row.
@@ -398,10 +399,12 @@ fn slice_plot(i: usize, side: f32, square: bool) -> Plot<'static> {
 /// The title of a view, with the scale of its false colours.
 fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
     ui.horizontal(|ui| {
-        let wide = ui.available_width() >= TITLE_WITH_MEANING;
+        let room = ui.available_width();
         ui.label(RichText::new(TITLES[i]).strong()).on_hover_text(MEANINGS[i]);
-        if wide && i > PREDICTION {
+        if i > PREDICTION && room >= WITH_MEANING {
             ui.label(RichText::new(MEANINGS[i]).small());
+        } else if i == DIFFERENCE && room >= WITH_SHORT_MEANING {
+            ui.label(RichText::new("prediction - truth of ln f").small());
         }
         let Some(limit) = limit else { return };
         let (map, low, high) = if i == DIFFERENCE {
