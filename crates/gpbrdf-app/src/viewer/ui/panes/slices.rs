@@ -42,7 +42,7 @@ const AXES: egui::Vec2 = vec2(72.0, 40.0);
 const TITLE: f32 = 28.0;
 /// Titles of at least these widths have room for the whole and for the short meaning of the false colours.
 const WITH_MEANING: f32 = 470.0;
-const WITH_SHORT_MEANING: f32 = 380.0;
+const WITH_SHORT_MEANING: f32 = 350.0;
 /// Between two views.
 const GAP: f32 = 10.0;
 /// From this width on, all tools are in one row.
