@@ -1,4 +1,5 @@
-//! Photographs the viewer without a window: `cargo run --release -p gpbrdf-app --example photograph -- FOLDER [NAME...]`.
+//! Photographs the viewer without a window:
+//! `cargo run --release -p gpbrdf-app --example photograph -- FOLDER [NAME...]`.
 //!
 //! Each picture is a PNG of that name in the folder; without names, all of them are made. A software adapter will do.
 #![expect(clippy::print_stdout, reason = "an example reports to a terminal")]

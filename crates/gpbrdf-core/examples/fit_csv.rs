@@ -73,7 +73,8 @@ fn run(file: &Path, model_file: &Path) -> Result {
     println!("{inside} of {} values kept back are in their 95 % interval", 3 * predictions.len());
     for ((angles, value), p) in unknown.angles.iter().zip(&unknown.values).zip(&predictions).take(3) {
         println!(
-            "theta_h {:4.1}, theta_d {:4.1}, phi_d {:5.1} degrees: measured {:.4}, predicted {:.4}, from {:.4} to {:.4}",
+            "theta_h {:4.1}, theta_d {:4.1}, phi_d {:5.1} degrees: \
+             measured {:.4}, predicted {:.4}, from {:.4} to {:.4}",
             angles.theta_h.to_degrees(),
             angles.theta_d.to_degrees(),
             angles.phi_d.to_degrees(),
