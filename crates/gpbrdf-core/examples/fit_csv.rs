@@ -49,7 +49,7 @@ fn run(file: &Path, model_file: &Path) -> Result {
     let measured = SampleSet::from(&read_samples_csv(file)?);
     println!("{} measurements in {}", measured.angles.len(), file.display());
     let part = |kept_back: bool| {
-        let chosen = |i: &usize| (i % KEPT_BACK == 0) == kept_back;
+        let chosen = |i: &usize| i.is_multiple_of(KEPT_BACK) == kept_back;
         let indices: Vec<usize> = (0..measured.angles.len()).filter(chosen).collect();
         SampleSet {
             angles: indices.iter().map(|&i| measured.angles[i]).collect(),
