@@ -6,18 +6,16 @@
 
 use std::path::{Path, PathBuf};
 
-use gpbrdf_core::{
-    FitOptions, IntervalOf, Layout, Model, Provenance, Sample, SampleSet, Samples, Source, fit,
-    read_samples_csv, write_samples_csv,
-};
+use gpbrdf_core::formats::write_samples_csv;
+use gpbrdf_core::{FitOptions, IntervalOf, Layout, Model, SampleSet, Source, fit};
+
+type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
 /// Measurements in the file that the example writes.
 const COUNT: usize = 500;
 
 /// One measurement out of this many is kept back from the fit.
 const KEPT_BACK: usize = 5;
-
-type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
 fn main() -> Result {
     let mut arguments = std::env::args_os().skip(1).map(PathBuf::from);
@@ -34,37 +32,33 @@ fn main() -> Result {
 
 /// A file as a goniometer would write it: one direction pair and its red, green and blue values per line.
 fn write_measurements(file: &Path) -> Result {
-    let source = Source::built_in("red-plastic")?;
-    let Some(brdf) = source.brdf() else { return Ok(()) };
-    let set = SampleSet::measure(brdf, &Layout::Random { count: COUNT, seed: 1 })?;
-    let samples = set.angles.iter().zip(&set.values).map(|(angles, &value)| {
-        let (wi, wo) = angles.to_directions();
-        Sample { wi, wo, value }
-    });
-    write_samples_csv(file, &Samples { description: source.name.clone(), samples: samples.collect() })?;
+    let samples = Source::built_in("red-plastic")?.measure(&Layout::Random { count: COUNT, seed: 1 })?;
+    write_samples_csv(file, &samples)?;
     Ok(())
 }
 
 fn run(file: &Path, model_file: &Path) -> Result {
-    let measured = SampleSet::from(&read_samples_csv(file)?);
-    println!("{} measurements in {}", measured.angles.len(), file.display());
+    let source = Source::open(file)?;
+    let measured = source.samples()?;
+    println!("{} measurements in {}", measured.len(), file.display());
     let part = |kept_back: bool| {
         let chosen = |i: &usize| i.is_multiple_of(KEPT_BACK) == kept_back;
-        let indices: Vec<usize> = (0..measured.angles.len()).filter(chosen).collect();
+        let indices: Vec<usize> = (0..measured.len()).filter(chosen).collect();
         SampleSet {
             angles: indices.iter().map(|&i| measured.angles[i]).collect(),
             values: indices.iter().map(|&i| measured.values[i]).collect(),
-            ..measured.clone()
+            origin: measured.origin.clone(),
+            ..SampleSet::default()
         }
     };
     let (known, unknown) = (part(false), part(true));
 
-    let (model, reports) = fit(&known, &FitOptions::default(), Provenance::default())?;
-    println!("log marginal likelihood {:.1}", reports[0].log_marginal_likelihood);
-    std::fs::write(model_file, model.to_bytes()?)?;
+    let fitted = fit(&known, &FitOptions::default())?;
+    println!("log marginal likelihood {:.1}", fitted.reports[0].log_marginal_likelihood);
+    fitted.model.save(model_file)?;
     let model = Model::load(model_file)?;
 
-    let predictions = model.predict(&unknown.angles, IntervalOf::Observation);
+    let predictions = model.predict(&unknown.angles, IntervalOf::Observation)?;
     let inside = predictions
         .iter()
         .zip(&unknown.values)

@@ -7,9 +7,9 @@
 
 use std::ops::ControlFlow;
 
+use gpbrdf_core::brdf::direction;
 use gpbrdf_core::{
-    Brdf, FitOptions, LatticeLayout, Layout, Model, Provenance, SampleSet, Source, Symmetry, bake_mean,
-    direction, fit,
+    Brdf, FitOptions, LatticeLayout, Layout, Model, Source, Symmetry, bake_mean, fit, nalgebra,
 };
 use gpbrdf_render::{Baker, BrdfTexture, Context, LOOKUP_WGSL, Precision};
 
@@ -93,11 +93,9 @@ fn open_device() -> Result<(wgpu::Adapter, wgpu::Device, wgpu::Queue)> {
 
 /// Red plastic from some 1,500 measurements.
 fn fit_material() -> Result<Model> {
-    let source = Source::built_in("red-plastic")?;
-    let Some(brdf) = source.brdf() else { return Err("red-plastic: expected a function".into()) };
     let layout = LatticeLayout::with_samples(1500, Symmetry::Bilateral)?;
-    let samples = SampleSet::measure(brdf, &Layout::Lattice(layout))?;
-    Ok(fit(&samples, &FitOptions::default(), Provenance::default())?.0)
+    let samples = Source::built_in("red-plastic")?.measure(&Layout::Lattice(layout))?;
+    Ok(fit(&samples, &FitOptions::default())?.model)
 }
 
 /// One dispatch of [`SHADER`]: red, green and blue that each viewer sees, and sigma.
