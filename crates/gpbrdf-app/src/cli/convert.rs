@@ -18,7 +18,7 @@ pub(crate) struct Convert {
     input: PathBuf,
     /// File to write: .binary (MERL table), .exr (table) or .csv (samples).
     output: PathBuf,
-    /// Number of samples of a .csv from a source that can be asked anywhere.
+    /// Number of samples of a .csv from a source that can be evaluated at any direction.
     #[arg(long, value_name = "N", default_value_t = 3072)]
     samples: usize,
 }
@@ -29,9 +29,9 @@ impl Convert {
         let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         match extension.as_str() {
             "binary" | "exr" => {
-                let Some(table) = terminal.stage("tabulating", || source.table()) else {
+                let Some(table) = terminal.stage("Tabulating", || source.table()) else {
                     bail!(
-                        "{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead",
+                        "{}: expected a BRDF that can be evaluated at any direction, found scattered samples; bake them instead",
                         source.origin()
                     );
                 };

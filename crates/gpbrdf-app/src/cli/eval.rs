@@ -9,8 +9,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
-use super::report::{cell_interval, metric_lines, significant};
 use super::terminal::Terminal;
+use crate::job::{judge, metric_lines, significant};
 
 #[derive(Args, Debug)]
 pub(crate) struct Eval {
@@ -45,21 +45,18 @@ impl Eval {
             match source.table() {
                 Some(table) => Ok(table.into_owned()),
                 None => bail!(
-                    "{}: expected a table, a model or a BRDF that can be asked anywhere, found scattered samples",
+                    "{}: expected a table, a model or a BRDF that can be evaluated at any direction, found scattered samples",
                     source.origin()
                 ),
             }
         };
-        let truth_table = terminal.stage("tabulating the truth", || table(&truth))?;
+        let truth_table = terminal.stage("Tabulating the truth", || table(&truth))?;
         let metrics = if let Content::Model(model) = &prediction.content {
-            let (mean, sigma) = terminal.stage("baking", || (bake_mean(model), bake_sigma(model)));
-            let noise = model.noise_variances();
-            let interval = |cell: usize| cell_interval(model, noise, &mean, &sigma, cell);
-            terminal
-                .stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
+            let (mean, sigma) = terminal.stage("Baking", || (bake_mean(model), bake_sigma(model)));
+            terminal.stage("Comparing", || judge(&truth_table, model, &mean, Some(&sigma), &environment))?
         } else {
             let predicted = table(&prediction)?;
-            terminal.stage("comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
+            terminal.stage("Comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
         };
         if self.json {
             let metrics = serde_json::to_value(&metrics)?;
@@ -79,7 +76,7 @@ impl Eval {
         samples: &gpbrdf_core::Samples,
     ) -> Result<()> {
         let angles: Vec<_> = samples.samples.iter().map(gpbrdf_core::Sample::half_diff).collect();
-        let predicted = terminal.stage("predicting", || model.predict(&angles, IntervalOf::Observation));
+        let predicted = terminal.stage("Predicting", || model.predict(&angles, IntervalOf::Observation));
         let (mut absolute, mut square, mut covered) = (0.0, 0.0, 0usize);
         let mut logs = Vec::with_capacity(3 * samples.samples.len());
         for (sample, p) in samples.samples.iter().zip(&predicted) {

@@ -8,8 +8,8 @@ use gpbrdf_core::{Content, merl_material_name};
 use serde_json::json;
 
 use super::input::open;
-use super::report::describe;
 use super::terminal::Terminal;
+use crate::job::describe;
 
 #[derive(Args, Debug)]
 pub(crate) struct Info {

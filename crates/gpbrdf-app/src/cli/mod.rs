@@ -1,18 +1,15 @@
 //! Parse, run, print the chain of errors, and choose the exit code.
 
-mod backend;
 mod bake;
 mod convert;
 mod eval;
 mod fit;
-mod inducing_args;
 mod info;
 mod input;
 mod materials;
-mod model_args;
+mod parse;
 mod predict;
 mod render;
-mod report;
 mod reproduce;
 mod shader;
 mod slice;
@@ -22,6 +19,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::job::Observer;
+use crate::output;
 use terminal::Terminal;
 
 /// Complete, render-ready BRDFs out of few measurements, with an error bar.
@@ -71,19 +70,19 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    let terminal = Terminal::new(arguments.quiet, arguments.verbose);
     // Ctrl-C: no partial file stays behind, nor an empty folder.
     let handler = ctrlc::set_handler(|| {
-        let _held = (gpbrdf_core::remove_pending(), input::remove_empty_folders());
+        let _held = (gpbrdf_core::remove_pending(), output::remove_empty_folders());
         std::process::exit(130);
     });
     if let Err(error) = handler {
-        eprintln!("warning: Ctrl-C may leave temporary files behind: {error}");
+        terminal.warn(&format!("Ctrl-C may leave temporary files behind: {error}"));
     }
     if let Some(threads) = arguments.threads {
         // Fails only where a pool exists already, and none does yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
     }
-    let terminal = Terminal::new(arguments.quiet, arguments.verbose);
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
@@ -101,14 +100,13 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error));
+            terminal.error(&one_line(&error));
             ExitCode::FAILURE
         }
     }
 }
 
-/// The chain of causes from the outside in, joined by colons. A cause that the message before it already ends with is
-/// left out.
+/// The chain of causes from the outside in, joined by colons, without causes that the message before them ends with.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain().map(ToString::to_string) {

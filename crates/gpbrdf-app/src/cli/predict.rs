@@ -29,7 +29,7 @@ impl Predict {
         let model = Model::load(&self.model)?;
         let directions = read_directions_csv(&self.directions)?;
         let of = if self.latent { IntervalOf::Latent } else { IntervalOf::Observation };
-        let predictions = terminal.stage("predicting", || model.predict(&directions.angles, of));
+        let predictions = terminal.stage("Predicting", || model.predict(&directions.angles, of));
         let mut text = directions.columns.join(",");
         for part in ["", "_lower", "_upper"] {
             for channel in ["r", "g", "b"] {

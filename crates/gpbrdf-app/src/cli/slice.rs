@@ -72,7 +72,7 @@ fn table(source: &Source) -> Result<BrdfTable> {
     match source.table() {
         Some(table) => Ok(table.into_owned()),
         None => bail!(
-            "{}: expected a BRDF that can be asked anywhere, found scattered samples; fit them first",
+            "{}: expected a BRDF that can be evaluated at any direction, found scattered samples; fit them first",
             source.origin()
         ),
     }

@@ -12,14 +12,13 @@ use gpbrdf_core::{
 
 use super::plot::{Axis, Curve, curves};
 use super::table::Table;
-use crate::cli::report::cell_interval;
-use crate::cli::terminal::Terminal;
+use crate::job::{DENSE_EVALUATIONS, Observer, judge};
 
 /// What an experiment leaves: tables, and pictures by their file names.
 #[derive(Debug, Default)]
-pub(super) struct Outcome {
-    pub(super) tables: Vec<Table>,
-    pub(super) figures: Vec<(String, Vec<u8>)>,
+pub(crate) struct Outcome {
+    pub(crate) tables: Vec<Table>,
+    pub(crate) figures: Vec<(String, Vec<u8>)>,
 }
 
 impl Outcome {
@@ -46,7 +45,7 @@ impl Outcome {
 }
 
 /// The materials of the paper's table 2, and the one of its figures.
-pub(super) const PAPER_MATERIALS: [&str; 7] = [
+pub(crate) const PAPER_MATERIALS: [&str; 7] = [
     "red-plastic",
     "purple-paint",
     "blue-rubber",
@@ -56,25 +55,22 @@ pub(super) const PAPER_MATERIALS: [&str; 7] = [
     "cherry-235",
 ];
 
-/// Evaluations of likelihood and gradient that a dense search is taken to need.
-const DENSE_EVALUATIONS: usize = 40;
-
 /// The largest dense run, whatever the budget: its matrix takes 3.2 GB.
 const MAX_DENSE: usize = 20_000;
 
 #[derive(Debug)]
-pub(super) struct Context {
-    pub(super) quick: bool,
+pub(crate) struct Context {
+    pub(crate) quick: bool,
     /// Seconds for one dense fit.
-    pub(super) budget: f64,
-    pub(super) environment: Environment,
+    pub(crate) budget: f64,
+    pub(crate) environment: Environment,
     /// Stand-ins for the paper's materials, [`PAPER_MATERIALS`].
-    pub(super) built_in: Vec<Source>,
+    pub(crate) built_in: Vec<Source>,
     /// The measurements found with `--data`.
-    pub(super) measured: Vec<Source>,
+    pub(crate) measured: Vec<Source>,
     /// Restriction to these materials, where there is one.
-    pub(super) only: Vec<String>,
-    pub(super) neural: Vec<(String, NeuralBrdf)>,
+    pub(crate) only: Vec<String>,
+    pub(crate) neural: Vec<(String, NeuralBrdf)>,
 }
 
 /// A material of an experiment.
@@ -217,13 +213,8 @@ impl Context {
         interval: bool,
     ) -> Result<Fitted> {
         let mean = bake_mean(&model);
-        let metrics = if interval {
-            let (sigma, noise) = (bake_sigma(&model), model.noise_variances());
-            let of = |cell: usize| cell_interval(&model, noise, &mean, &sigma, cell);
-            Metrics::new(truth, &mean, &self.environment, Some(&of))?
-        } else {
-            Metrics::new(truth, &mean, &self.environment, None)?
-        };
+        let sigma = interval.then(|| bake_sigma(&model));
+        let metrics = judge(truth, &model, &mean, sigma.as_ref(), &self.environment)?;
         Ok(Fitted { model, mean, metrics, fit_seconds })
     }
 }
@@ -232,7 +223,7 @@ impl Context {
 ///
 /// # Errors
 /// A folder that cannot be read or holds none, or a damaged file.
-pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Source>> {
+pub(crate) fn measurements(folder: &Path, observer: &dyn Observer) -> Result<Vec<Source>> {
     let mut files = Vec::new();
     collect(folder, &mut files, 0)?;
     files.sort();
@@ -241,7 +232,7 @@ pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Sou
         let extension = file.extension().map(|e| e.to_ascii_lowercase());
         let merl = extension.as_deref().is_some_and(|e| e == "binary");
         if merl && gpbrdf_core::merl_material_name(&gpbrdf_core::sha256_file(&file)?).is_none() {
-            terminal.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
+            observer.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
             continue;
         }
         if merl || extension.as_deref().is_some_and(|e| e == "bsdf") {

@@ -7,9 +7,9 @@ use gpbrdf_core::{
 use serde_json::json;
 
 use super::context::{Context, Outcome};
-use super::materials::PAPER_SAMPLES;
 use super::plot::{Axis, Curve};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 /// Points of a curve of the distribution.
 const STEPS: usize = 200;

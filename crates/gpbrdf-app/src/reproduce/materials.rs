@@ -10,6 +10,7 @@ use super::measures::{
 };
 use super::paper_lattice::{paper_cells, paper_options, paper_samples};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 /// The paper's table 2: MAE, MSE and what it calls PSNR.
 const PAPER: [(&str, [f64; 3]); 6] = [
@@ -20,9 +21,6 @@ const PAPER: [(&str, [f64; 3]); 6] = [
     ("silver-paint", [0.0124, 0.0345, 62.7547]),
     ("violet-rubber", [0.0054, 0.0253, 64.0961]),
 ];
-
-/// The paper's number of samples.
-pub(super) const PAPER_SAMPLES: usize = 37_616;
 
 const MEASURES: [Measure; 7] = [MAE, MSE, PAPER_PSNR, PSNR_ENV, PSNR_POINT, SSIM_ENV, MEDIAN_LN];
 

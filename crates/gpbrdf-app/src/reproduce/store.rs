@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::context::Outcome;
 use super::table::Table;
-use crate::cli::input::OutputFolder;
+use crate::output::OutputFolder;
 
 /// `NAME.json`: an experiment's tables, what they depend on, and the files beside it.
 #[derive(Debug, Deserialize, Serialize)]
@@ -24,7 +24,7 @@ struct Record {
 }
 
 /// Whether `folder` holds the result of an experiment of this key, with all its files.
-pub(super) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
+pub(crate) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
     let Ok(text) = fs::read_to_string(folder.join(format!("{name}.json"))) else { return false };
     let Ok(record) = serde_json::from_str::<Record>(&text) else { return false };
     record.experiment == name
@@ -36,7 +36,7 @@ pub(super) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
 ///
 /// # Errors
 /// A folder or file that cannot be written.
-pub(super) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcome: Outcome) -> Result<usize> {
+pub(crate) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcome: Outcome) -> Result<usize> {
     let target = OutputFolder::create(folder)?;
     let mut contents: Vec<(String, Vec<u8>)> = outcome.figures;
     for table in &outcome.tables {

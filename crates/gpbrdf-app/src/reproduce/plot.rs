@@ -7,7 +7,7 @@ use plotters::prelude::{
 };
 use plotters::style::Color;
 
-use crate::cli::report::significant;
+use crate::job::significant;
 
 /// Named points, joined by a line.
 #[derive(Clone, Debug, PartialEq)]

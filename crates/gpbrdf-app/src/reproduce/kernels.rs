@@ -5,10 +5,10 @@ use gpbrdf_core::{FitOptions, Shape};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
-use super::materials::PAPER_SAMPLES;
 use super::measures::{MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, cells, columns};
 use super::paper_lattice::{paper_options, paper_samples};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 const RQ: Shape = Shape::RationalQuadratic { alpha: 1.0 };
 const SE: Shape = Shape::SquaredExponential;

@@ -1,16 +1,13 @@
 //! What a run has to say, for machines and for people.
 
-use std::collections::BTreeMap;
-use std::time::Instant;
-
-use anyhow::Result;
-use gpbrdf_core::{
-    BrdfTable, FitReport, KernelBody, LatticeLayout, Metrics, Model, Process, Rgb, SigmaTable, interval_95,
-};
+use gpbrdf_core::{KernelBody, LatticeLayout, Metrics, Model, Process};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::terminal::Terminal;
+use super::backend::CPU;
+use super::number::significant;
+use super::run::Outcome;
+use super::stage::Seconds;
 
 /// `report.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -19,9 +16,9 @@ pub(crate) struct Report {
     pub(crate) source: String,
     pub(crate) layout: String,
     pub(crate) lattice: Option<LatticeLayout>,
-    /// Measurements taken, or cells of a table that was compressed.
+    /// Measurements that were taken, or cells of a table that was compressed.
     pub(crate) samples: usize,
-    /// Numbers that the model stores: another size.
+    /// Numbers that the model stores.
     pub(crate) floats: usize,
     pub(crate) solver: &'static str,
     pub(crate) kernel: String,
@@ -37,40 +34,10 @@ pub(crate) struct Report {
     pub(crate) outputs: Vec<String>,
 }
 
-/// Stages of a run, in order.
-const STAGES: [&str; 8] = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "write", "total"];
-
-/// Wall-clock seconds of each stage; 0 for those that did not run.
-#[derive(Clone, Debug, Serialize)]
-#[serde(transparent)]
-pub(crate) struct Seconds(BTreeMap<&'static str, f64>);
-
-impl Default for Seconds {
-    fn default() -> Self {
-        Self(STAGES.into_iter().map(|stage| (stage, 0.0)).collect())
-    }
-}
-
-impl Seconds {
-    /// Adds the time that `work` takes to `stage`.
-    pub(crate) fn measure<T>(&mut self, stage: &'static str, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
-        let result = work();
-        self.add(stage, start);
-        result
-    }
-
-    pub(crate) fn add(&mut self, stage: &'static str, start: Instant) {
-        *self.0.entry(stage).or_default() += start.elapsed().as_secs_f64();
-    }
-
-    pub(crate) fn get(&self, stage: &str) -> f64 {
-        self.0.get(stage).copied().unwrap_or(0.0)
-    }
-}
-
 impl Report {
-    pub(crate) fn new(model: &Model, fits: &[FitReport], seconds: Seconds, backend: String) -> Self {
+    /// The report of a run that has led to this, so far.
+    pub(crate) fn new(outcome: &Outcome, seconds: Seconds) -> Self {
+        let (model, reports) = (&outcome.fitted.model, &outcome.fitted.reports);
         let provenance = &model.provenance;
         let (solver, kernel, hyper) = describe(model);
         Self {
@@ -84,26 +51,14 @@ impl Report {
             kernel,
             transform: serde_json::to_value(model.transform).unwrap_or_default(),
             hyperparameters: hyper,
-            log_marginal_likelihood: fits.iter().map(|f| f.log_marginal_likelihood).sum(),
-            evaluations: fits.iter().map(|f| f.evaluations).sum(),
-            converged: fits.iter().all(|f| f.converged),
-            at_bound: fits.iter().flat_map(|f| f.at_bound.iter().cloned()).collect(),
+            log_marginal_likelihood: outcome.fitted.log_marginal_likelihood.unwrap_or(f64::NAN),
+            evaluations: reports.iter().map(|report| report.evaluations).sum(),
+            converged: reports.iter().all(|report| report.converged),
+            at_bound: reports.iter().flat_map(|report| report.at_bound.iter().cloned()).collect(),
             seconds,
-            backend,
-            metrics: None,
+            backend: outcome.baked.as_ref().map_or_else(|| CPU.to_owned(), |baked| baked.backend.clone()),
+            metrics: outcome.metrics.clone(),
             outputs: Vec::new(),
-        }
-    }
-
-    /// Prints the report: JSON, or a summary for people.
-    pub(crate) fn show(&self, json: bool, terminal: &Terminal) -> Result<()> {
-        if !self.converged {
-            terminal.warn("the search for hyper-parameters did not converge");
-        }
-        if json {
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(self)?))
-        } else {
-            terminal.summary(&self.summary())
         }
     }
 
@@ -132,13 +87,10 @@ impl Report {
         if let Some(m) = &self.metrics {
             lines.extend(metric_lines(m));
         }
-        if self.backend != "cpu" {
+        if self.backend != CPU {
             lines.push(format!("  baked on {}", self.backend));
         }
-        let run = STAGES.iter().filter(|stage| self.seconds.get(stage) > 0.0);
-        let times: Vec<String> =
-            run.map(|stage| format!("{stage} {:.0} ms", 1e3 * self.seconds.get(stage))).collect();
-        lines.push(format!("  {}", times.join(", ")));
+        lines.push(format!("  {}", self.seconds.summary()));
         for output in &self.outputs {
             lines.push(format!("  wrote {output}"));
         }
@@ -166,34 +118,6 @@ pub(crate) fn metric_lines(m: &Metrics) -> Vec<String> {
         lines.push(format!("  95 % interval covers {:.1} % of the cells", 100.0 * coverage));
     }
     lines
-}
-
-/// The 95 % interval of a measurement in one cell of a baked table: lower and upper ends of each channel. `noise` is
-/// [`Model::noise_variances`].
-pub(crate) fn cell_interval(
-    model: &Model,
-    noise: Rgb,
-    mean: &BrdfTable,
-    sigma: &SigmaTable,
-    cell: usize,
-) -> (Rgb, Rgb) {
-    let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-        let latent = f64::from(sigma.value(cell, c));
-        let mean = f64::from(mean.values()[cell][c]);
-        interval_95(model.transform, mean, (latent * latent + noise[c]).sqrt())
-    });
-    (ends.map(|e| e.0), ends.map(|e| e.1))
-}
-
-/// Four significant digits.
-pub(crate) fn significant(x: f64) -> String {
-    if x != 0.0 && !(1e-3..1e5).contains(&x.abs()) {
-        return format!("{x:.3e}");
-    }
-    let digits = if x == 0.0 { 0.0 } else { (3.0 - x.abs().log10().floor()).max(0.0) };
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 6")]
-    let digits = digits as usize;
-    format!("{x:.digits$}")
 }
 
 /// Solver, kernel and hyper-parameters of a model.

@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::cli::report::significant;
+use crate::job::significant;
 
 /// Rows of names and numbers under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Table {
+pub(crate) struct Table {
     /// Part of the file's name.
     pub(super) name: String,
     /// What the table shows.
@@ -66,7 +66,7 @@ impl Table {
     }
 
     /// Four digits of each number, for people.
-    pub(super) fn markdown(&self) -> String {
+    pub(crate) fn markdown(&self) -> String {
         let mut out = format!("## {}\n\n", self.title);
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         out.push_str(&line(&self.columns));
