@@ -1,5 +1,5 @@
-//! Damaged, foreign and absent files: exit code 1, one line that names file, expectation and finding, and nothing
-//! written.
+//! Damaged, foreign and absent files: exit code 1, one line that names the file, what was expected and what
+//! was found, and no file written.
 
 use std::sync::OnceLock;
 
@@ -93,8 +93,8 @@ fn damaged_merl_files() {
         &cli,
         "a.binary",
         &file(
-            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel R, \
-             theta_h 0, theta_d 0, phi_d 0",
+            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel \
+             R, theta_h 0, theta_d 0, phi_d 0",
         ),
     );
     cli.write("a.binary", filled(-1.0));

@@ -6,7 +6,7 @@ use crate::harness::Cli;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o,r,g,b\n";
 
-/// Bakes a CSV file without pictures; the report.
+/// Bakes a CSV file without pictures and returns the report.
 fn bake(cli: &Cli, rows: &str) -> Value {
     cli.write("s.csv", format!("{HEADER}{rows}"));
     let run = cli.run(&["bake", "s.csv", "-o", "out", "--no-images", "--json"]);

@@ -1,4 +1,4 @@
-//! Folders for outputs, which do not stay behind empty.
+//! Folders for outputs, which are removed again if they stay empty.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -19,17 +19,17 @@ fn created_folders() -> MutexGuard<'static, Vec<PathBuf>> {
     CREATED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the folders that were created for outputs and hold none yet, for a handler of Ctrl-C. No folder can be
-/// created while the result is held.
+/// Removes the folders that were created for outputs and hold none yet, for a handler of Ctrl-C. No folder
+/// can be created while the result is held.
 pub(crate) fn remove_empty_folders() -> MutexGuard<'static, Vec<PathBuf>> {
     let mut created = created_folders();
-    // Fails, as it should, for folders that hold something.
+    // This fails, as it should, for folders that hold something.
     created.drain(..).for_each(|p| drop(std::fs::remove_dir(p)));
     created
 }
 
 impl OutputFolder {
-    /// Refuses, before the work that leads up to it, a path that can be no folder.
+    /// Refuses a path that cannot be a folder, before the work whose results it is to hold.
     pub(crate) fn check(path: &Path) -> Result<()> {
         match path.ancestors().find(|p| p.exists()) {
             Some(existing) if !existing.is_dir() => {
@@ -70,7 +70,7 @@ impl Drop for OutputFolder {
     fn drop(&mut self) {
         let mut all = created_folders();
         all.retain(|p| !self.created.contains(p));
-        // Fails, as it should, for folders that hold something.
+        // This fails, as it should, for folders that hold something.
         self.created.iter().for_each(|p| drop(std::fs::remove_dir(p)));
     }
 }

@@ -1,4 +1,5 @@
-//! `gpbrdf-cli bake`: load, sample, bake, compare, write.
+//! `gpbrdf-cli bake`: measures a source, fits and bakes a model, compares it with the truth and writes it
+//! all.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -101,7 +102,7 @@ impl Outputs {
             let mut binary = AtomicFile::create(self.folder.join("table.binary"))?;
             let mut exr = AtomicFile::create(self.folder.join("table.exr"))?;
             let truth = outcome.truth.as_deref();
-            // Disk and processor at once.
+            // One file keeps the disk busy while the other one is compressed.
             let (binary_written, exr_written) =
                 rayon::join(|| write_merl_to(&mut binary, &baked.mean), || write_exr(&mut exr, baked, truth));
             binary_written.with_context(|| unwritten(&binary))?;

@@ -1,4 +1,4 @@
-//! `gpbrdf-cli convert`: any source as `.binary`, `.exr` or `.csv`.
+//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr` or `.csv`.
 
 use std::path::PathBuf;
 

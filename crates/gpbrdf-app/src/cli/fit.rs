@@ -1,4 +1,4 @@
-//! `gpbrdf-cli fit`: the model only.
+//! `gpbrdf-cli fit`: fits a model and writes nothing else.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ impl Fit {
         let mut run = Run::new(terminal.clone());
         let source = run.stage(Stage::Load, || open(&self.input))?;
         self.model.check(&source)?;
-        // Before the fit: a model that cannot be written is not worth the wait.
+        // Created before the fit, so that nobody waits for a model that cannot be written.
         let mut file = AtomicFile::create(&self.output)?;
         let outcome = run.job(&Job::new(&source, &self.model))?;
         run.stage(Stage::Write, || {

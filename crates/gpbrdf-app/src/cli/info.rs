@@ -1,4 +1,4 @@
-//! `gpbrdf-cli info`: what a file is.
+//! `gpbrdf-cli info`: describes a file or a built-in material.
 
 use std::path::PathBuf;
 
@@ -28,8 +28,12 @@ impl Info {
                 let data = |v: &&[f32; 3]| v.iter().all(|&x| x >= 0.0);
                 let filled = table.values().iter().filter(data);
                 let largest = filled.clone().flatten().fold(0.0f32, |a, &b| a.max(b));
-                json!({ "cells": table.values().len(), "cells_with_data": filled.count(), "largest_value": largest,
-                    "merl_material": merl_material_name(&source.sha256) })
+                json!({
+                    "cells": table.values().len(),
+                    "cells_with_data": filled.count(),
+                    "largest_value": largest,
+                    "merl_material": merl_material_name(&source.sha256),
+                })
             }
             Content::Samples(samples) => {
                 let largest = samples.samples.iter().flat_map(|s| s.value).fold(0.0, f64::max);
@@ -41,8 +45,15 @@ impl Info {
             }
             Content::Model(model) => {
                 let (solver, kernel, hyperparameters) = describe(model);
-                json!({ "samples": model.samples(), "floats": model.floats(), "solver": solver, "kernel": kernel, "transform": model.transform,
-                    "provenance": model.provenance, "hyperparameters": hyperparameters })
+                json!({
+                    "samples": model.samples(),
+                    "floats": model.floats(),
+                    "solver": solver,
+                    "kernel": kernel,
+                    "transform": model.transform,
+                    "provenance": model.provenance,
+                    "hyperparameters": hyperparameters,
+                })
             }
         };
         if self.json {

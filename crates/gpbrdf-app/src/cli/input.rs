@@ -5,13 +5,14 @@ use std::path::Path;
 use anyhow::{Result, bail};
 use gpbrdf_core::{Environment, Source, materials};
 
-/// Opens `input`: a file if there is one of that name, else a built-in material.
+/// Opens the file of this name, or else the built-in material.
 pub(crate) fn open(input: &Path) -> Result<Source> {
     if let Ok(metadata) = input.metadata()
         && !metadata.is_file()
         && !metadata.is_dir()
     {
-        // Its kind is found before it is read: a pipe would be drained by then.
+        // A file is opened once to recognise its kind and once more to read it, which drains a pipe too
+        // early.
         bail!("\"{}\": expected a regular file, found a pipe or a device", input.display());
     }
     if input.exists() || input.is_symlink() {

@@ -1,4 +1,4 @@
-//! Parse, run, print the chain of errors, and choose the exit code.
+//! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
 mod bake;
 mod convert;
@@ -29,10 +29,10 @@ use terminal::Terminal;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Print nothing but errors and what was asked for.
+    /// Print only errors and the result itself.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Print more; twice for even more.
+    /// Print more about the run; given twice, its results as they come.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
     /// Worker threads; all processors by default. Results do not depend on it.
@@ -80,7 +80,7 @@ pub fn main() -> ExitCode {
         terminal.warn(&format!("Ctrl-C may leave temporary files behind: {error}"));
     }
     if let Some(threads) = arguments.threads {
-        // Fails only where a pool exists already, and none does yet.
+        // This fails only if a pool exists already, and none does yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
     }
     let result = match arguments.command {
@@ -106,7 +106,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// The chain of causes from the outside in, joined by colons, without causes that the message before them ends with.
+/// The causes of an error from the outside in, joined by colons. A cause is left out where the message before
+/// it already ends with it.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain().map(ToString::to_string) {

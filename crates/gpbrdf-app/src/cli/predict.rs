@@ -13,13 +13,13 @@ use super::terminal::Terminal;
 pub(crate) struct Predict {
     /// Model file.
     model: PathBuf,
-    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the header says
-    /// otherwise.
+    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the
+    /// header says otherwise.
     directions: PathBuf,
     /// CSV file to write instead of standard output.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Intervals of the noise-free value instead of a new measurement's.
+    /// Give intervals of the noise-free value instead of those of a new measurement.
     #[arg(long)]
     latent: bool,
 }

@@ -28,17 +28,17 @@ pub(crate) struct Reproduce {
     /// Only these materials, by name.
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     materials: Vec<String>,
-    /// Weights of Neural BRDF fits to compare with, 675 a material.
+    /// CSV file with the weights of Neural BRDF fits to compare with, 675 per material.
     #[arg(long, value_name = "FILE")]
     nbrdf: Option<PathBuf>,
     /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
-    /// Seconds that one dense fit may be expected to take; decides its number of samples. [default: 60, or 1 with
-    /// --quick]
+    /// Seconds that one dense fit may be expected to take; decides its number of samples.
+    /// [default: 60, or 1 with --quick]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     budget: Option<f64>,
-    /// Folder for the outputs; what it holds already of the same options is not computed again.
+    /// Folder for the outputs. Experiments whose results of the same options it holds are not run again.
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
     output: PathBuf,
 }
@@ -104,7 +104,7 @@ impl Reproduce {
         Ok(())
     }
 
-    /// What results depend on: options and the sums of the inputs.
+    /// What the results depend on: the options and the checksums of the inputs.
     fn key(&self, context: &Context) -> Result<Value> {
         let sum = |file: &Option<PathBuf>| file.as_ref().map(sha256_file).transpose();
         let measured: Vec<&str> = context.measured.iter().map(|s| s.sha256.as_str()).collect();

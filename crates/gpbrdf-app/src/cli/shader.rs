@@ -46,7 +46,7 @@ impl Shader {
         let binary = language == ShaderLanguage::Spirv;
         let code = translate(language)?;
         let Some(path) = &self.output else {
-            if binary && terminal.is_read_by_people() {
+            if binary && terminal.is_terminal() {
                 bail!("SPIR-V is binary: expected --output FILE, found a terminal");
             }
             return terminal.print_bytes(&code);

@@ -1,9 +1,9 @@
-//! `gpbrdf-cli slice`: a picture at one `phi_d`.
+//! `gpbrdf-cli slice`: draws a BRDF at one `phi_d`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use clap::Args;
+use clap::{Args, value_parser};
 use gpbrdf_core::{AtomicFile, BrdfTable, Slice, SliceOptions, Source, slice_figure};
 
 use super::input::open;
@@ -22,14 +22,14 @@ pub(crate) struct SliceCommand {
     /// Exposure in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     exposure: f64,
-    /// Show theta_h by its square root, as the table stores it.
+    /// Space theta_h by its square root, as the table does.
     #[arg(long)]
     square_theta_h: bool,
-    /// Show beside a truth, with their difference.
+    /// Show a truth beside it, and their difference.
     #[arg(long, value_name = "TRUTH")]
     difference: Option<PathBuf>,
     /// Rows and columns of a slice.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=4096))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = value_parser!(u32).range(8..=4096))]
     size: u32,
 }
 

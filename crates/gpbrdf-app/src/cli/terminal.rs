@@ -13,8 +13,8 @@ use crate::job::{Found, Observer, Progress, Report, Stage, significant};
 pub(crate) struct Terminal {
     quiet: bool,
     verbose: u8,
-    /// Drawn on standard error where that is a terminal. It stays while one stage follows another, and steps aside
-    /// for each line that is printed.
+    /// Drawn on standard error if that is a terminal. It stays while one stage follows another and steps
+    /// aside for each line that is printed, so that short stages make no flicker.
     spinner: ProgressBar,
 }
 
@@ -44,8 +44,8 @@ impl Terminal {
         })
     }
 
-    /// Whether a person reads standard output, who wants no bytes.
-    pub(crate) fn is_read_by_people(&self) -> bool {
+    /// Whether standard output is a terminal, which shows no binary data.
+    pub(crate) fn is_terminal(&self) -> bool {
         io::stdout().is_terminal()
     }
 

@@ -11,11 +11,12 @@ use super::choices::parse_lattice;
 #[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Compression {
-    /// Compress the whole table: fit inducing lattices of so many nodes along theta_h, theta_d and phi_d to all
-    /// cells, one for each of three colour components.
+    /// Compress the whole table: fit inducing lattices of so many nodes along theta_h, theta_d and phi_d to
+    /// all cells, one for each of three colour components.
     #[arg(long, value_name = "HxDxP", value_parser = parse_lattice, conflicts_with_all = EXCLUDED)]
     pub(crate) inducing: Option<[usize; 3]>,
-    /// Compress the whole table to at most N stored numbers, all constants included; finds the lattices' shapes.
+    /// Compress the whole table to at most N stored numbers, all constants included; finds the lattices'
+    /// shapes.
     #[arg(long, value_name = "N", conflicts_with_all = EXCLUDED, conflicts_with = "inducing")]
     pub(crate) floats: Option<usize>,
     /// Share of a cell's weight in the compression that goes by how much it shows in pictures, 0 to 1.

@@ -1,25 +1,16 @@
 //! What a dense fit will take, said before it starts.
 
 use anyhow::Result;
-use gpbrdf_core::{DenseCost, dense_cost};
+use gpbrdf_core::dense_cost;
 
 /// Evaluations of likelihood and gradient that a dense search usually takes.
-pub(crate) const DENSE_EVALUATIONS: usize = 40;
+const DENSE_EVALUATIONS: usize = 40;
 
 /// A fit that takes longer than this is announced, seconds.
 const LONG: f64 = 10.0;
 
 /// Fewer samples than this take a second and a few MB; measuring the machine's speed would take longer.
 const SHORT_RUN: usize = 1000;
-
-/// Memory and time of one dense fit to `samples` samples.
-fn cost(samples: usize, per_channel: bool) -> DenseCost {
-    let mut cost = dense_cost(samples, 3, DENSE_EVALUATIONS);
-    if per_channel {
-        cost.seconds *= 3.0;
-    }
-    cost
-}
 
 /// A sentence about a dense fit to `samples` samples, if it will take long.
 ///
@@ -29,10 +20,26 @@ pub(crate) fn forecast(samples: usize, per_channel: bool) -> Result<Option<Strin
     if samples < SHORT_RUN {
         return Ok(None);
     }
-    let cost = cost(samples, per_channel);
+    let cost = dense_cost(samples, 3, DENSE_EVALUATIONS);
     cost.check()?;
     let gib = cost.bytes / (1u64 << 30) as f64;
-    let seconds = cost.seconds;
+    // Each channel has a search of its own.
+    let seconds = if per_channel { 3.0 * cost.seconds } else { cost.seconds };
     Ok((seconds > LONG)
         .then(|| format!("a dense fit to {samples} samples takes {gib:.1} GiB and about {seconds:.0} s")))
+}
+
+/// The largest number of samples, of at most `limit`, whose dense fit with `terms` kernels is expected to
+/// take no more than `seconds`.
+pub(crate) fn samples_within(seconds: f64, terms: usize, limit: usize) -> usize {
+    let fits = |n: usize| {
+        let cost = dense_cost(n, 3, DENSE_EVALUATIONS * terms);
+        cost.seconds <= seconds && cost.check().is_ok()
+    };
+    let (mut low, mut high) = (64, limit);
+    while low + 1 < high {
+        let middle = usize::midpoint(low, high);
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    low
 }

@@ -17,8 +17,8 @@ const SHAPES: [(&str, Shape); 6] = [
     ("matern", Shape::Matern { nu: 1.5 }),
 ];
 
-/// The kernel along `theta_h`, `theta_d` and `phi_d`, each a sum of names joined by `+`. As text it is one sum for all
-/// axes, or three joined by commas. Off a lattice the first is the kernel of all axes.
+/// The kernel along `theta_h`, `theta_d` and `phi_d`, each a sum of names joined by `+`. As text it is one
+/// sum for all axes, or three joined by commas. Off a lattice the first is the kernel of all axes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub(crate) struct Kernels([String; 3]);

@@ -1,8 +1,8 @@
 //! One job for both programs: measure a source, fit a model to it, bake the model and judge the result.
 //!
-//! [`ModelSpec`] says how to measure and what to fit; it is read from a command line by clap and from a session of
-//! the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results. [`Report`] is
-//! what the command line says about a run, to machines and to people.
+//! [`ModelSpec`] says how to measure and what to fit; it is read from a command line by clap and from a
+//! session of the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results.
+//! [`Report`] is what the command line says about a run, to machines and to people.
 
 #![allow(dead_code, unused_imports, reason = "the viewer's half is not joined yet")]
 
@@ -24,7 +24,7 @@ mod stage;
 pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
 pub(crate) use compression::Compression;
-pub(crate) use forecast::{DENSE_EVALUATIONS, forecast};
+pub(crate) use forecast::samples_within;
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::{HyperParameter, hyper_parameters, set_hyper_parameter};
 pub(crate) use judge::judge;

@@ -96,7 +96,8 @@ pub(crate) struct Baking {
     pub(crate) sigma: bool,
 }
 
-/// Where the table of the truth comes from. Scattered samples and, with [`Job::keep_model`], models have none.
+/// Where the table of the truth comes from. Scattered samples and, with [`Job::keep_model`], models have
+/// none.
 #[derive(Clone, Debug)]
 pub(crate) enum Truth {
     Unwanted,
@@ -465,8 +466,8 @@ mod tests {
             let error = Run::new(witness).job(&whole(&source, &spec)).unwrap_err();
             assert!(matches!(error.downcast_ref(), Some(Error::Cancelled)), "{error:?}");
             let told = told.lock().unwrap();
-            let stages = told.iter().filter(|t| t.starts_with(char::is_uppercase));
-            assert_eq!(stages.last().unwrap(), stage.label());
+            let mut stages = told.iter().filter(|t| t.starts_with(char::is_uppercase));
+            assert_eq!(stages.next_back().unwrap(), stage.label());
         }
     }
 }

@@ -1,4 +1,5 @@
-//! How to measure a source and what to fit to it, as options of the command line and in sessions of the viewer.
+//! How to measure a source and what to fit to it, as options of the command line and in sessions of the
+//! viewer.
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -18,7 +19,8 @@ pub(crate) const PAPER_SAMPLES: usize = 37_616;
 /// Samples off a lattice are solved densely: a number that takes seconds.
 const DENSE_SAMPLES: usize = 2_000;
 
-/// The largest lattice: a table has 1,458,000 cells, so more nodes than this hold nothing new, and take gigabytes.
+/// The largest lattice: a table has 1,458,000 cells, so more nodes than this hold nothing new, and take
+/// gigabytes.
 const MAX_NODES: usize = 1 << 22;
 
 /// How to measure and fit one material.
@@ -34,19 +36,19 @@ pub(crate) struct ModelSpec {
     /// Where to sample a source that can be evaluated at any direction.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) layout: LayoutChoice,
-    /// Symmetry in phi_d that samples and model rely on. auto measures it at a source that can be evaluated at any
-    /// direction; scattered samples are taken for bilateral.
+    /// Symmetry in phi_d that samples and model rely on. auto measures it at a source that can be evaluated
+    /// at any direction; scattered samples are taken for bilateral.
     #[arg(long, value_enum, default_value_t)]
     pub(crate) symmetry: SymmetryChoice,
-    /// Place the lattice's nodes at sqrt(theta_h) = t^EXPONENT with t evenly spaced; above 1 they crowd at the
-    /// specular peak. By default they stand on the table's cells there and spread out from it.
+    /// Place the lattice's nodes at sqrt(theta_h) = t^EXPONENT with t evenly spaced; above 1 they crowd at
+    /// the specular peak. By default they stand on the table's cells there and spread out from it.
     #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
     pub(crate) node_density: Option<f64>,
     /// Exact solver.
     #[arg(long, default_value = "auto", value_parser = named::<Solver>(&["auto", "lattice", "dense"]))]
     pub(crate) solver: Solver,
-    /// Kernel shapes, summed: se, rq, matern12, matern32, matern52, matern (with --nu). On a lattice there may be
-    /// three such sums joined by commas, for theta_h, theta_d and phi_d.
+    /// Kernel shapes, summed: se, rq, matern12, matern32, matern52, matern (with --nu). On a lattice there
+    /// may be three such sums joined by commas, for theta_h, theta_d and phi_d.
     #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value_t)]
     pub(crate) kernel: Kernels,
     /// Smoothness of `--kernel matern`.
@@ -56,7 +58,12 @@ pub(crate) struct ModelSpec {
     #[arg(long, value_enum, default_value_t)]
     pub(crate) transform: TransformChoice,
     /// Epsilon of `--transform log`, sr^-1.
-    #[arg(long, value_name = "VALUE", default_value_t = ModelSpec::default().epsilon, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "VALUE",
+        default_value_t = ModelSpec::default().epsilon,
+        allow_hyphen_values = true
+    )]
     pub(crate) epsilon: f64,
     /// Prior mean.
     #[arg(long, default_value = "constant", value_parser = named::<MeanFunction>(&["constant", "zero"]))]
@@ -234,8 +241,8 @@ impl ModelSpec {
 /// What the viewer's panel shows and sets.
 #[cfg(feature = "viewer")]
 impl ModelSpec {
-    /// The specification that an interactive program starts with: a lattice of a known shape, and so few samples off
-    /// it that a dense fit takes a second.
+    /// The specification that an interactive program starts with: a lattice of a known shape, and so few
+    /// samples off it that a dense fit takes a second.
     pub(crate) fn interactive() -> Self {
         Self { lattice: Some(LatticeLayout::default().shape), samples: Some(800), ..Self::default() }
     }

@@ -1,4 +1,4 @@
-//! What all experiments share: options, materials, and the comparison of a model with its truth.
+//! Options and materials, which all experiments share, and the comparison of a model with its truth.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -7,14 +7,14 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail};
 use gpbrdf_core::{
     BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, NeuralBrdf, Provenance,
-    SampleSet, Source, Symmetry, bake_mean, bake_sigma, dense_cost, detect_symmetry, fit,
+    SampleSet, Source, Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
 use super::table::Table;
-use crate::job::{DENSE_EVALUATIONS, Observer, judge};
+use crate::job::{Observer, judge, samples_within};
 
-/// What an experiment leaves: tables, and pictures by their file names.
+/// The results of an experiment: tables, and pictures with the names of their files.
 #[derive(Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) tables: Vec<Table>,
@@ -55,7 +55,7 @@ pub(crate) const PAPER_MATERIALS: [&str; 7] = [
     "cherry-235",
 ];
 
-/// The largest dense run, whatever the budget: its matrix takes 3.2 GB.
+/// The largest number of samples of a dense fit, whatever the budget: its matrix takes 3.2 GB.
 const MAX_DENSE: usize = 20_000;
 
 #[derive(Debug)]
@@ -68,7 +68,7 @@ pub(crate) struct Context {
     pub(crate) built_in: Vec<Source>,
     /// The measurements found with `--data`.
     pub(crate) measured: Vec<Source>,
-    /// Restriction to these materials, where there is one.
+    /// The only materials to use; all if empty.
     pub(crate) only: Vec<String>,
     pub(crate) neural: Vec<(String, NeuralBrdf)>,
 }
@@ -77,7 +77,7 @@ pub(crate) struct Context {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Material<'a> {
     source: &'a Source,
-    /// What kind of truth it is, for people.
+    /// What people read about its truth.
     pub(super) origin: &'a str,
 }
 
@@ -89,23 +89,23 @@ impl<'a> Material<'a> {
     /// The table that predictions are compared with.
     ///
     /// # Errors
-    /// A source of scattered samples.
+    /// If the source is scattered samples.
     pub(super) fn truth(&self) -> Result<Cow<'a, BrdfTable>> {
         self.source.table().with_context(|| self.shapeless())
     }
 
-    /// Asks the source itself on the default lattice of about `count` nodes.
+    /// Measures the source on the default lattice of about `count` nodes.
     ///
     /// # Errors
-    /// A source of scattered samples, or a count out of range.
+    /// If the source is scattered samples, or the count out of range.
     pub(super) fn lattice_samples(&self, count: usize) -> Result<SampleSet> {
         self.measure(|symmetry| Ok(LatticeLayout::with_samples(count, symmetry)?))
     }
 
-    /// Asks the source itself on a lattice that relies on the symmetry it has.
+    /// Measures the source on a lattice that relies on the symmetry of the source.
     ///
     /// # Errors
-    /// A source of scattered samples, or a broken lattice.
+    /// If the source is scattered samples, or the lattice broken.
     pub(super) fn measure(
         &self,
         layout: impl FnOnce(Symmetry) -> Result<LatticeLayout>,
@@ -120,7 +120,7 @@ impl<'a> Material<'a> {
     }
 }
 
-/// A fitted model, its table and how it compares.
+/// A fitted model, its table and its metrics.
 #[derive(Debug)]
 pub(super) struct Fitted {
     pub(super) model: Model,
@@ -134,10 +134,10 @@ impl Context {
         self.only.is_empty() || self.only.iter().any(|only| only == name)
     }
 
-    /// The paper's materials: the user's MERL files where there are some, else reconstructions.
+    /// The paper's materials: the user's MERL files as far as they are there, else reconstructions.
     ///
     /// # Errors
-    /// `--materials` that names none of them.
+    /// If `--materials` names none of them.
     pub(super) fn paper_materials(&self) -> Result<Vec<Material<'_>>> {
         let of = |built_in: &'_ Source| {
             self.measured.iter().find(|s| s.name == built_in.name && s.kind.contains("MERL"))
@@ -162,7 +162,7 @@ impl Context {
     /// The measurements of `--data`, or the paper's materials without any.
     ///
     /// # Errors
-    /// `--materials` that names none of them.
+    /// If `--materials` names none of them.
     pub(super) fn all_materials(&self) -> Result<Vec<Material<'_>>> {
         let measured = self.measured.iter().filter(|source| self.wanted(&source.name));
         let mut found: Vec<_> = measured.map(|source| Material { source, origin: &source.kind }).collect();
@@ -179,19 +179,11 @@ impl Context {
 
     /// The largest number of samples whose dense fit with `terms` kernels keeps to the budget of time.
     pub(super) fn dense_samples(&self, terms: usize) -> usize {
-        let fits = |n: usize| {
-            let cost = dense_cost(n, 3, DENSE_EVALUATIONS * terms);
-            cost.seconds <= self.budget && cost.check().is_ok()
-        };
-        let (mut low, mut high) = (64, MAX_DENSE);
-        while low + 1 < high {
-            let middle = usize::midpoint(low, high);
-            if fits(middle) { low = middle } else { high = middle }
-        }
-        low
+        samples_within(self.budget, terms, MAX_DENSE)
     }
 
-    /// Fits a model to samples, bakes it and compares it with the truth; `interval` bakes sigma for the coverage.
+    /// Fits a model to samples, bakes it and compares it with the truth. With `interval` sigma is baked too,
+    /// for the coverage of the interval.
     pub(super) fn fit_and_compare(
         &self,
         truth: &BrdfTable,
@@ -219,10 +211,11 @@ impl Context {
     }
 }
 
-/// Every file under `folder` that is an RGL measurement or one of the 100 published MERL tables, sorted by name.
+/// Every file under `folder` that is an RGL measurement or one of the 100 published MERL tables, sorted by
+/// name.
 ///
 /// # Errors
-/// A folder that cannot be read or holds none, or a damaged file.
+/// If the folder cannot be read or holds none, or a file is damaged.
 pub(crate) fn measurements(folder: &Path, observer: &dyn Observer) -> Result<Vec<Source>> {
     let mut files = Vec::new();
     collect(folder, &mut files, 0)?;

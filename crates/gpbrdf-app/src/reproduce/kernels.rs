@@ -14,7 +14,7 @@ const RQ: Shape = Shape::RationalQuadratic { alpha: 1.0 };
 const SE: Shape = Shape::SquaredExponential;
 const MATERN: Shape = Shape::Matern32;
 
-/// Kernel, and the paper's MAE, MSE and PSNR.
+/// Each kernel, with the paper's MAE, MSE and PSNR.
 const KERNELS: [(&str, &[Shape], [f64; 3]); 6] = [
     ("RQ", &[RQ], [0.0134, 0.0830, 54.4767]),
     ("SE", &[SE], [0.0156, 0.0875, 50.2725]),
@@ -39,7 +39,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             &["fit s", "paper MAE", "paper MSE", "paper PSNR"],
         ),
     );
-    // Sums search over twice the parameters; all are given as many samples as a sum can have.
+    // A sum has twice as many parameters to search. All kernels are given as many samples as a sum can have.
     let most = context.dense_samples(2);
     let few = paper_samples(&truth, most);
     let many = material.lattice_samples(PAPER_SAMPLES)?;
@@ -58,9 +58,10 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(format!(
-        "Dense: the paper's setting with ARD kernels on {most} of its cells, what a budget of {} s is expected to hold for a sum. \
-         Lattice: products of 1-D kernels along the axes, not ARD kernels, on ln(f + 0.001). Matern is of order 3/2: the paper does \
-         not say which it takes, nor which material its figures are for, nor how its PSNR was had.",
+        "Dense: the paper's setting with ARD kernels on {most} of its cells, what a budget of {} s is \
+         expected to hold for a sum. Lattice: products of 1-D kernels along the axes, not ARD kernels, on \
+         ln(f + 0.001). Matern is of order 3/2: the paper does not say which it takes, nor which material \
+         its figures are for, nor how its PSNR was had.",
         context.budget
     ));
     Ok(Outcome { tables: vec![table], figures: Vec::new() })

@@ -1,4 +1,5 @@
-//! The paper's experiments. Each returns tables and pictures; [`store`] writes them together and finds them again.
+//! The paper's experiments. Each returns tables and pictures; [`store`] writes those of one experiment
+//! together and finds them again.
 
 mod beyond;
 mod context;
@@ -18,6 +19,12 @@ use clap::ValueEnum;
 
 use context::Outcome;
 pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
+
+/// Seconds for a fit on a lattice, its table, pictures and metrics.
+const LATTICE: f64 = 4.0;
+
+/// Seconds for a fit on a lattice, its table, pictures and metrics.
+const LATTICE: f64 = 4.0;
 
 /// The experiments, in the order of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -62,10 +69,10 @@ impl Experiment {
         }
     }
 
-    /// Expected seconds, within a factor of three on a machine of two cores: dense fits take their budget and, to bake,
-    /// half of it again; a lattice fit with table, pictures and metrics takes some seconds.
+    /// The expected time in seconds, right within a factor of three on a machine with two cores. A dense fit
+    /// takes its budget, and baking it half as long again; a lattice fit takes [`LATTICE`] with its table,
+    /// pictures and metrics.
     pub(crate) fn seconds(self, context: &Context) -> f64 {
-        const LATTICE: f64 = 4.0;
         let dense = 1.5 * context.budget + LATTICE;
         let paper = context::PAPER_MATERIALS.len() as f64;
         let paper = if context.only.is_empty() { paper } else { paper.min(context.only.len() as f64) };

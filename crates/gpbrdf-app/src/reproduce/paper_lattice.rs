@@ -1,11 +1,12 @@
-//! The paper's own setting: its lattice of table cells, its kernel, and what of it a dense solver can hold.
+//! The paper's own setting: its lattice of table cells, thinned to what a dense solver can hold, and its
+//! kernel.
 
 use gpbrdf_core::{
     Brdf, BrdfTable, FitOptions, HalfDiff, InputSpace, MeanFunction, N_PHI_D, N_THETA_D, N_THETA_H,
     SampleSet, Shape, Solver, Transform, cell_center,
 };
 
-/// Every fifth `theta_h`, third `theta_d` and second `phi_d` cell, those above the horizon: the paper counts 37,616.
+/// Every fifth `theta_h`, third `theta_d` and second `phi_d` cell above the horizon; the paper counts 37,616.
 pub(super) fn paper_cells() -> Vec<HalfDiff> {
     let mut cells = Vec::new();
     for h in (0..N_THETA_H).step_by(5) {
@@ -17,8 +18,8 @@ pub(super) fn paper_cells() -> Vec<HalfDiff> {
     cells
 }
 
-/// `count` of the paper's cells, spread evenly over them: those whose index times the golden ratio has the smallest
-/// fractions.
+/// Measures `count` of the paper's cells, spread evenly over them: those whose index times the golden ratio
+/// has the smallest fractional parts.
 pub(super) fn paper_samples(truth: &BrdfTable, count: usize) -> SampleSet {
     let cells = paper_cells();
     let mut order: Vec<usize> = (0..cells.len()).collect();
@@ -31,7 +32,8 @@ pub(super) fn paper_samples(truth: &BrdfTable, count: usize) -> SampleSet {
     SampleSet { angles, values, lattice: None, layout: "cells" }
 }
 
-/// Identity transform, zero mean, kernels on the plain half-difference angles, dense.
+/// The paper's model: a dense process on `f` itself, with zero mean and kernels on the plain half-difference
+/// angles.
 pub(super) fn paper_options(kernel: Vec<Shape>) -> FitOptions {
     FitOptions {
         solver: Solver::Dense,

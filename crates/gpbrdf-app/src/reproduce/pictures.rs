@@ -70,8 +70,8 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(
-        "The paper finds the difference below 5 % under its point light, on pictures of its own scene. Figures 3 and 5 are spheres \
-         here; figure 4 shows slices at phi_d = 90 degrees.",
+        "The paper finds the difference below 5 % under its point light, on pictures of its own scene. \
+         Figures 3 and 5 are spheres here; figure 4 shows slices at phi_d = 90 degrees.",
     );
     let x = Axis { name: "|1 - b / a|, point light", logarithmic: true };
     let y = Axis { name: "share of pixels below", logarithmic: false };

@@ -1,4 +1,4 @@
-//! Results on disk: written together, and found again by a later run.
+//! Results on disk: the files of an experiment are written together, and a later run finds them again.
 
 use std::fs;
 use std::io::Write;
@@ -32,10 +32,10 @@ pub(crate) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
         && record.files.iter().all(|file| folder.join(file).is_file())
 }
 
-/// Writes all files of an experiment, or none; their number.
+/// Writes all files of an experiment, or none, and returns how many there are.
 ///
 /// # Errors
-/// A folder or file that cannot be written.
+/// If a folder or file cannot be written.
 pub(crate) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcome: Outcome) -> Result<usize> {
     let target = OutputFolder::create(folder)?;
     let mut contents: Vec<(String, Vec<u8>)> = outcome.figures;
@@ -51,7 +51,7 @@ pub(crate) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcom
         tables: outcome.tables,
         files: contents.iter().map(|(file, _)| file.clone()).collect(),
     };
-    // The record last: where it stands, the rest does.
+    // The record comes last, so that the other files are there where it is.
     let mut json = serde_json::to_vec_pretty(&record)?;
     json.push(b'\n');
     contents.push((format!("{name}.json"), json));

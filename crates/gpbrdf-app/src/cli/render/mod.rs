@@ -6,7 +6,7 @@ mod pictures;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
-use clap::Args;
+use clap::{Args, value_parser};
 use gpbrdf_core::{AtomicFile, BrdfTable, Content, PixelDifference, Source, exposure_of, psnr, ssim};
 use gpbrdf_render::{
     AdapterChoice, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
@@ -38,8 +38,15 @@ pub(crate) struct Render {
     /// A single light instead of an environment.
     #[arg(long, value_enum, conflicts_with = "env")]
     light: Option<LightName>,
-    /// Towards the directional light, or position of the point light (the object is in the unit sphere).
-    #[arg(long, value_name = "X,Y,Z", default_value = "1,1,1.5", value_parser = parse_vector, allow_hyphen_values = true)]
+    /// Direction towards the directional light, or position of the point light; the object fills the unit
+    /// sphere.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "1,1,1.5",
+        value_parser = parse_vector,
+        allow_hyphen_values = true
+    )]
     light_at: [f32; 3],
     /// Environment map: studio, or a latitude-longitude .hdr or .exr file. [default: studio]
     #[arg(long, value_name = "studio|FILE")]
@@ -48,7 +55,7 @@ pub(crate) struct Render {
     #[arg(long, value_enum, default_value = "mis")]
     sampling: SamplingName,
     /// Samples per pixel.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=1 << 20))]
     spp: u32,
     /// Columns and rows of the picture.
     #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
@@ -60,7 +67,13 @@ pub(crate) struct Render {
     #[arg(long)]
     orthographic: bool,
     /// Exposure in stops; auto brings the 90th percentile to 0.6.
-    #[arg(long, value_name = "auto|STOPS", default_value = "auto", value_parser = parse_exposure, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "auto|STOPS",
+        default_value = "auto",
+        value_parser = parse_exposure,
+        allow_hyphen_values = true
+    )]
     exposure: Exposure,
     /// Tone curve.
     #[arg(long, value_enum, default_value = "filmic")]
