@@ -23,9 +23,6 @@ pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
 /// Seconds for a fit on a lattice, its table, pictures and metrics.
 const LATTICE: f64 = 4.0;
 
-/// Seconds for a fit on a lattice, its table, pictures and metrics.
-const LATTICE: f64 = 4.0;
-
 /// The experiments, in the order of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Experiment {
