@@ -144,7 +144,7 @@ pub(crate) fn data_dir() -> Option<PathBuf> {
     let found = "no GPBRDF_DATA and no ../shared/data";
     assert!(!std::env::var("GPBRDF_REQUIRE_DATA").is_ok_and(|v| v == "1"), "{found}");
     // Not by `eprintln!`, which is captured.
-    writeln!(std::io::stderr(), "skipped: {found}").unwrap();
+    std::io::stderr().write_all(format!("skipped: {found}\n").as_bytes()).unwrap();
     None
 }
 
