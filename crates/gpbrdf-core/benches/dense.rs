@@ -4,7 +4,9 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gpbrdf_core::{DenseEvaluator, Kernel, Shape};
+use gpbrdf_core::Shape;
+use gpbrdf_core::gp::DenseEvaluator;
+use gpbrdf_core::kernel::Kernel;
 
 const N: usize = 4096;
 

@@ -1,30 +1,28 @@
-//! The lattice process at 64 x 32 x 18 = 36,864 nodes, RGB: fit with all hyper-parameters optimised, mean and sigma of the table.
+//! The lattice process at 64 x 32 x 18 = 36,864 nodes, RGB: fit with all hyper-parameters optimised, mean and sigma of the
+//! table.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gpbrdf_core::{
-    FitOptions, LatticeLayout, Layout, Provenance, SampleSet, Source, bake_mean, bake_sigma, fit,
-};
+use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Source, bake_mean, bake_sigma, fit};
 
 fn lattice(c: &mut Criterion) {
     let mut group = c.benchmark_group("lattice_36864_rgb");
     group.sample_size(20);
     // A measurement where one is given, else a built-in material.
     let source = std::env::var_os("GPBRDF_BENCH_INPUT")
-        .map_or_else(|| Source::built_in("cherry-235"), |path| Source::open(path.as_ref()));
+        .map_or_else(|| Source::built_in("cherry-235"), |path| Source::open(path));
     let Ok(source) = source else {
         eprintln!("skipped: GPBRDF_BENCH_INPUT cannot be read");
         return;
     };
-    let Some(brdf) = source.brdf() else { return };
     let layout = Layout::Lattice(LatticeLayout::default());
-    let Ok(samples) = SampleSet::measure(brdf, &layout) else { return };
+    let Ok(samples) = source.measure(&layout) else { return };
     let options = FitOptions::default();
-    let run = || fit(black_box(&samples), &options, Provenance::default());
-    let Ok((model, _)) = run() else { return };
-    group.bench_function("sample", |b| b.iter(|| SampleSet::measure(brdf, black_box(&layout))));
+    let run = || fit(black_box(&samples), &options);
+    let Ok(model) = run().map(|fit| fit.model) else { return };
+    group.bench_function("sample", |b| b.iter(|| source.measure(black_box(&layout))));
     group.bench_function("fit", |b| b.iter(run));
     group.bench_function("bake_mean", |b| b.iter(|| bake_mean(black_box(&model))));
     group.bench_function("bake_sigma", |b| b.iter(|| bake_sigma(black_box(&model))));

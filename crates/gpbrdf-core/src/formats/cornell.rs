@@ -7,11 +7,11 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-use crate::angles::direction;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::brdf::angles::direction;
 use crate::formats::read_bytes;
-use crate::samples::{Sample, Samples};
-use crate::spectrum::SpectrumToRgb;
+use crate::formats::spectrum::SpectrumToRgb;
+use crate::sample::{Sample, SampleSet};
 
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 28;
@@ -24,12 +24,12 @@ const MAX_WAVELENGTHS: usize = 10_000;
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] with the line when it is not of this format, a
 /// number is not finite or a direction is below the horizon.
-pub fn read_cornell(path: impl AsRef<Path>) -> Result<Samples> {
+pub fn read_cornell(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
     parse(&read_bytes(path, "Cornell", LIMIT_BYTES)?, path)
 }
 
-fn parse(bytes: &[u8], path: &Path) -> Result<Samples> {
+fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
     let wrong = |expected: String, found: String| Error::Format {
         format: "Cornell",
         path: path.to_owned(),
@@ -124,7 +124,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Samples> {
         .map(str::trim)
         .filter(|comment| !comment.is_empty() && !comment.starts_with("num wls"))
         .collect();
-    Ok(Samples { description: comments.join(", "), samples })
+    Ok(SampleSet { description: comments.join(", "), ..samples.into_iter().collect() })
 }
 
 #[cfg(test)]
@@ -144,10 +144,10 @@ mod tests {
     #[test]
     fn grey_samples_are_grey() {
         let found = parse(SMALL.as_bytes(), Path::new("x")).unwrap();
-        assert_eq!(found.samples.len(), 2);
+        assert_eq!(found.len(), 2);
         assert_eq!(found.description, "Grey");
-        assert!(found.samples[0].value.iter().all(|value| (value - 0.2).abs() < 1e-6));
-        assert!((found.samples[0].wo - direction(0.25, -2.5)).norm() < 1e-15);
+        assert!(found.values[0].iter().all(|value| (value - 0.2).abs() < 1e-6));
+        assert!((found.directions[0][1] - direction(0.25, -2.5)).norm() < 1e-15);
     }
 
     #[test]
@@ -187,14 +187,14 @@ mod tests {
         let Some(data) = data_dir() else { return };
         let median = |name: &str| -> [f64; 3] {
             let found = read_cornell(data.join("cornell").join(name)).unwrap();
-            assert_eq!(found.samples.len(), 1439, "{name}");
+            assert_eq!(found.len(), 1439, "{name}");
             let tilted: Vec<_> = (1..=8).map(|k| f64::from(10 * k).to_radians().cos()).collect();
-            for sample in &found.samples {
+            for sample in found.iter() {
                 assert!(sample.value.iter().all(|v| v.is_finite() && *v >= 0.0));
                 assert!(tilted.iter().any(|cos| (cos - sample.wi.z).abs() < 1e-5), "{}", sample.wi);
             }
             std::array::from_fn(|c| {
-                let mut values: Vec<_> = found.samples.iter().map(|s| s.value[c]).collect();
+                let mut values: Vec<_> = found.values.iter().map(|v| v[c]).collect();
                 values.sort_by(f64::total_cmp);
                 values[values.len() / 2]
             })

@@ -8,10 +8,10 @@
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-use crate::atomic_file::AtomicFile;
-use crate::error::{Error, Result};
+use crate::base::atomic_file::AtomicFile;
+use crate::base::error::{Error, Result};
+use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 use crate::formats::{NotFinite, open};
-use crate::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 
 /// Size of a MERL file in bytes: 34,992,012.
 pub const MERL_BYTES: u64 = 12 + 3 * 8 * N_CELLS as u64;
@@ -98,7 +98,6 @@ fn read(mut from: impl Read, length: Option<u64>, path: &Path) -> Result<BrdfTab
         return Err(wrong_size("more".to_owned()));
     }
     BrdfTable::from_values(values)
-        .ok_or_else(|| wrong(format!("{N_CELLS} cells"), "another number".to_owned()))
 }
 
 /// The three dimensions at the start of a MERL file.
@@ -206,7 +205,7 @@ mod tests {
     #[test]
     fn layout_is_the_published_one() {
         let mut values = vec![[0.0; 3]; N_CELLS];
-        values[crate::table::cell_index(3, 5, 7)] = [1.0, 1.15, 1.66];
+        values[crate::brdf::table::cell_index(3, 5, 7)] = [1.0, 1.15, 1.66];
         let bytes = encode(&BrdfTable::from_values(values).unwrap());
         assert_eq!(bytes[..12], [90, 0, 0, 0, 90, 0, 0, 0, 180, 0, 0, 0]);
         let index = 7 + 180 * (5 + 90 * 3);

@@ -3,14 +3,28 @@
 pub(crate) mod cornell;
 pub(crate) mod image_exr;
 pub(crate) mod merl;
-pub(crate) mod merl_sha256;
+pub(crate) mod merl_names;
 #[cfg(test)]
 pub(crate) mod mutate;
 pub(crate) mod neural_csv;
 pub(crate) mod rgl;
 pub(crate) mod samples_csv;
+pub(crate) mod source;
+pub(crate) mod spectrum;
 pub(crate) mod table_exr;
 mod tensor_file;
+
+pub use cornell::read_cornell;
+pub use image_exr::write_image_exr;
+pub use merl::{MERL_BYTES, read_merl, write_merl, write_merl_to};
+pub use merl_names::merl_material_name;
+pub use neural_csv::read_neural_csv;
+pub use rgl::{RglBrdf, read_rgl};
+pub use samples_csv::{
+    Directions, read_directions_csv, read_samples_csv, write_samples_csv, write_samples_csv_to,
+};
+pub use source::{Content, Source};
+pub use table_exr::{ExrChannels, ExrPart, read_table_exr, write_table_exr, write_table_exr_to};
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -19,8 +33,8 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
-use crate::error::{Error, Result};
-use crate::table::cell_indices;
+use crate::base::error::{Error, Result};
+use crate::brdf::table::cell_indices;
 
 /// The kinds of file that this crate reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,20 +1,18 @@
 //! Seeded damage to a file's bytes, for tests that no reader panics.
 #![allow(clippy::cast_possible_truncation, reason = "random bits may be cut")]
 
-/// The splitmix64 generator.
-pub(crate) struct Random(u64);
+use crate::base::random::SplitMix64;
+
+/// Random integers of the sizes that damage needs.
+pub(crate) struct Random(SplitMix64);
 
 impl Random {
     pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(SplitMix64::new(seed))
     }
 
     pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     /// 32 random bits.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::analytic::{NEURAL_FLOATS, NeuralBrdf};
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::brdf::analytic::{NEURAL_FLOATS, NeuralBrdf};
 use crate::formats::read_bytes;
 
 const FORMAT: &str = "Neural BRDF";
@@ -70,7 +70,7 @@ pub fn read_neural_csv(path: &Path) -> Result<Vec<(String, NeuralBrdf)>> {
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
-    use crate::source::Source;
+    use crate::formats::source::Source;
     use crate::test_data::data_dir;
 
     #[test]

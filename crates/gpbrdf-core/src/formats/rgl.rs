@@ -18,16 +18,14 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
+use crate::base::error::Result;
+use crate::brdf::angles::HORIZON_COSINE;
 use crate::brdf::{Brdf, Rgb};
-use crate::error::Result;
 use crate::formats::read_bytes;
 use crate::formats::tensor_file::{TensorFile, U8};
 
 /// Larger than every file of the database, spectral and anisotropic ones included.
 const LIMIT_BYTES: u64 = 1 << 30;
-
-/// The smallest `cos(theta_o)` by which values are divided; below it the measurements are extrapolated anyway.
-const MIN_COSINE: f64 = 1e-6;
 
 /// An isotropic RGB measurement of the RGL database. About 1.3 MB.
 #[derive(Clone)]
@@ -300,7 +298,7 @@ impl Brdf for RglBrdf {
         if !(wi.z > 0.0 && wo.z > 0.0) {
             return [0.0; 3];
         }
-        let scale = 1.0 / wo.z.max(MIN_COSINE);
+        let scale = 1.0 / wo.z.max(HORIZON_COSINE);
         self.eval_with_cosine(wi, wo).map(|value| value * scale)
     }
 }
@@ -327,7 +325,7 @@ pub fn read_rgl(path: impl AsRef<Path>) -> Result<RglBrdf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::angles::direction;
+    use crate::brdf::angles::direction;
     use crate::formats::mutate::{Random, mutations};
     use crate::formats::tensor_file::F32;
     use crate::test_data::data_dir;

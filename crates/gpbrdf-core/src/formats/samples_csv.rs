@@ -15,12 +15,12 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::angles::{HalfDiff, direction, fold_phi_d};
-use crate::atomic_file::AtomicFile;
+use crate::base::atomic_file::AtomicFile;
+use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
-use crate::error::{Error, Result};
+use crate::brdf::angles::{HalfDiff, direction, fold_phi_d};
 use crate::formats::read_bytes;
-use crate::samples::{Sample, Samples};
+use crate::sample::{Sample, SampleSet};
 
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 30;
@@ -319,12 +319,12 @@ fn shortened(text: &str) -> String {
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] with line and column when a column is missing,
 /// a number is not finite, a value negative, an angle out of range or a direction below the horizon, and when
 /// the file has no rows.
-pub fn read_samples_csv(path: impl AsRef<Path>) -> Result<Samples> {
+pub fn read_samples_csv(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
     parse_samples(&read_bytes(path, "samples CSV", LIMIT_BYTES)?, path)
 }
 
-fn parse_samples(bytes: &[u8], path: &Path) -> Result<Samples> {
+fn parse_samples(bytes: &[u8], path: &Path) -> Result<SampleSet> {
     let source = Source { path };
     let mut samples = Vec::new();
     source.read(bytes, true, |record, header, layout| {
@@ -339,7 +339,7 @@ fn parse_samples(bytes: &[u8], path: &Path) -> Result<Samples> {
         .map_while(|line| line.strip_prefix('#'))
         .map(str::trim)
         .collect();
-    Ok(Samples { description: comments.join("\n"), samples })
+    Ok(SampleSet { description: comments.join("\n"), ..samples.into_iter().collect() })
 }
 
 /// Reads directions; columns of values, if there are any, are ignored.
@@ -374,7 +374,7 @@ fn parse_directions(bytes: &[u8], path: &Path) -> Result<Directions> {
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be written; nothing is left then.
-pub fn write_samples_csv(path: impl AsRef<Path>, samples: &Samples) -> Result<()> {
+pub fn write_samples_csv(path: impl AsRef<Path>, samples: &SampleSet) -> Result<()> {
     let mut file = AtomicFile::create(path.as_ref())?;
     write_samples_csv_to(&mut file, samples).map_err(|source| Error::write(path.as_ref(), source))?;
     file.commit()
@@ -384,12 +384,12 @@ pub fn write_samples_csv(path: impl AsRef<Path>, samples: &Samples) -> Result<()
 ///
 /// # Errors
 /// What `to` answers.
-pub fn write_samples_csv_to(mut to: impl Write, samples: &Samples) -> io::Result<()> {
+pub fn write_samples_csv_to(mut to: impl Write, samples: &SampleSet) -> io::Result<()> {
     for line in samples.description.lines() {
         writeln!(to, "# {line}")?;
     }
     writeln!(to, "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,r,g,b")?;
-    for Sample { wi, wo, value } in &samples.samples {
+    for Sample { wi, wo, value } in samples.iter() {
         for w in [wi, wo] {
             let theta = w.x.hypot(w.y).atan2(w.z).to_degrees();
             write!(to, "{theta},{},", w.y.atan2(w.x).to_degrees())?;
@@ -404,7 +404,7 @@ mod tests {
     use super::*;
     use crate::formats::mutate::{Random, mutations};
 
-    fn parse(text: &str) -> Result<Samples> {
+    fn parse(text: &str) -> Result<SampleSet> {
         parse_samples(text.as_bytes(), Path::new("x.csv"))
     }
 
@@ -426,8 +426,8 @@ mod tests {
         ];
         for text in texts {
             let found = parse(text).unwrap();
-            assert_eq!(found.samples.len(), 1, "{text}");
-            let sample = found.samples[0];
+            assert_eq!(found.len(), 1, "{text}");
+            let sample = found.iter().next().unwrap();
             assert!((sample.wi - expected).norm() < 1e-15, "{text}");
             assert!((sample.wo - direction(10f64.to_radians(), 0.0)).norm() < 1e-15, "{text}");
             assert_eq!(sample.value, [1.0, 2.0, 3.0], "{text}");
@@ -437,9 +437,9 @@ mod tests {
 
     #[test]
     fn half_difference_and_grey_columns_are_understood() {
-        let found = parse("f,theta_h,theta_d,phi_d\n0.25,20,30,200\n").unwrap().samples[0];
-        assert_eq!(found.value, [0.25; 3]);
-        let angles = found.half_diff();
+        let found = parse("f,theta_h,theta_d,phi_d\n0.25,20,30,200\n").unwrap();
+        assert_eq!(found.values[0], [0.25; 3]);
+        let angles = found.angles[0];
         assert!((angles.theta_h.to_degrees() - 20.0).abs() < 1e-12);
         assert!((angles.theta_d.to_degrees() - 30.0).abs() < 1e-12);
         assert!((angles.phi_d.to_degrees() - 20.0).abs() < 1e-12);
@@ -492,21 +492,21 @@ mod tests {
     fn samples_round_trip() {
         let mut random = Random::new(2);
         let mut unit = || random.next() as f64 / u64::MAX as f64;
-        let samples = (0..500)
+        let samples: SampleSet = (0..500)
             .map(|_| Sample {
                 wi: direction(1.57 * unit(), 7.0 * unit()),
                 wo: direction(1.57 * unit(), 7.0 * unit()),
                 value: [unit() * 1e3, unit() * 1e-9, 0.0],
             })
             .collect();
-        let written = Samples { description: "two\nlines".to_owned(), samples };
+        let written = SampleSet { description: "two\nlines".to_owned(), ..samples };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.csv");
         write_samples_csv(&path, &written).unwrap();
         let read = read_samples_csv(&path).unwrap();
         assert_eq!(read.description, written.description);
-        assert_eq!(read.samples.len(), written.samples.len());
-        for (a, b) in read.samples.iter().zip(&written.samples) {
+        assert_eq!(read.len(), written.len());
+        for (a, b) in read.iter().zip(written.iter()) {
             assert_eq!(a.value, b.value);
             assert!((a.wi - b.wi).norm() < 1e-14 && (a.wo - b.wo).norm() < 1e-14);
         }
@@ -531,7 +531,7 @@ mod tests {
         for bytes in mutations(text.as_bytes(), text.len(), 9, 20_000) {
             if let Ok(samples) = parse_samples(&bytes, Path::new("x")) {
                 survivors += 1;
-                assert!(samples.samples.iter().all(|s| s.wi.z > 0.0 && s.value.iter().all(|v| *v >= 0.0)));
+                assert!(samples.iter().all(|s| s.wi.z > 0.0 && s.value.iter().all(|v| *v >= 0.0)));
             }
             let _ = parse_directions(&bytes, Path::new("x"));
         }

@@ -22,10 +22,10 @@ use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, Sample
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::f16;
 
-use crate::atomic_file::AtomicFile;
-use crate::error::{Error, Result};
+use crate::base::atomic_file::AtomicFile;
+use crate::base::error::{Error, Result};
+use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 use crate::formats::{NotFinite, open};
-use crate::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 
 const WIDTH: usize = N_PHI_D;
 const HEIGHT: usize = N_THETA_D * N_THETA_H;
@@ -278,7 +278,7 @@ fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
     if let Some(found) = not_finite.found() {
         return Err(wrong("finite numbers", found));
     }
-    BrdfTable::from_values(values).ok_or_else(|| wrong("1458000 cells", "another number".to_owned()))
+    BrdfTable::from_values(values)
 }
 
 /// Where a flat part has its channels R, G, B, if it has them as whole floating-point images.
@@ -297,8 +297,8 @@ mod tests {
     use std::io::Cursor;
 
     use super::*;
+    use crate::brdf::table::cell_index;
     use crate::formats::mutate::mutations;
-    use crate::table::cell_index;
 
     fn table() -> BrdfTable {
         BrdfTable::from_fn(|a| [a.theta_h, -a.theta_d, 1e-40 + a.phi_d])

@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// The `dtype` of `f32` arrays.
 pub(super) const F32: u8 = 10;

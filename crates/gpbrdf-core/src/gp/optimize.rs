@@ -9,7 +9,8 @@ use argmin::solver::linesearch::condition::ArmijoCondition;
 use argmin::solver::linesearch::{BacktrackingLineSearch, HagerZhangLineSearch, MoreThuenteLineSearch};
 use argmin::solver::quasinewton::LBFGS;
 
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
+use crate::base::random::SplitMix64;
 
 /// One parameter of a maximisation, on a logarithmic scale.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,7 +90,7 @@ where
         failure: None,
     }));
     let mut overall: Option<(f64, Vec<f64>, bool)> = None;
-    let mut random = SplitMix64(options.seed);
+    let mut random = SplitMix64::new(options.seed);
     for start in 0..=options.restarts {
         let mut x: Vec<f64> = parameters
             .iter()
@@ -259,26 +260,6 @@ where
         LineSearchKind::Backtracking => {
             execute!(BacktrackingLineSearch::new(ArmijoCondition::new(1e-4).ok()?))
         }
-    }
-}
-
-/// `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, OOPSLA 2014): the seeded generator of restarts and layouts.
-#[derive(Clone, Debug)]
-pub(crate) struct SplitMix64(pub(crate) u64);
-
-impl SplitMix64 {
-    /// The next 64 random bits.
-    pub(crate) fn next_u64(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform on `[0, 1)`.
-    pub(crate) fn next_unit(&mut self) -> f64 {
-        (self.next_u64() >> 11) as f64 * (0.5f64).powi(53)
     }
 }
 

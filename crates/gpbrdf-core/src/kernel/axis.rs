@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::shape::Shape;
-use crate::error::{Error, Result};
-use crate::simd::{add_scaled, scale_in_place};
+use crate::base::error::{Error, Result};
+use crate::base::simd::{add_scaled, scale_in_place};
 
 /// One summand of a [`Kernel1d`]: `weight shape(d / length_scale)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axis::{Kernel1d, ParameterKind, check_log_parameters, positive};
 use super::shape::Shape;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// How far apart two values of one coordinate are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

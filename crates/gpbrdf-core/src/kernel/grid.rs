@@ -2,7 +2,7 @@
 
 use super::axis::{Kernel1d, Term1d};
 use super::shape::Shape;
-use crate::simd::{exp_slice, vectorized};
+use crate::base::simd::{exp_slice, vectorized};
 
 /// Largest exponent on either side of the middle for which a separated exponential stays in range.
 const LARGEST_EXPONENT: f64 = 600.0;

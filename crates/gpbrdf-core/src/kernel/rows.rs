@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::axis::Kernel1d;
 use super::composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
-use crate::simd::{add_scaled, dot, dot3, multiply, scale_into, vectorized};
+use crate::base::simd::{add_scaled, dot, dot3, multiply, scale_into, vectorized};
 
 /// Points of a strip.
 const STRIP: usize = 512;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::bessel::log_power_bessel_k;
-use crate::error::{Error, Result};
+use crate::base::error::{Error, Result};
 
 /// A radial covariance function `k(r)` with `k(0) = 1`, of the scaled distance
 /// `r = sqrt(sum_k (x_k - x'_k)^2 / l_k^2)`.

@@ -1,7 +1,7 @@
 //! Shapes over whole slices, in vector instructions where the form is closed.
 
 use super::shape::Shape;
-use crate::simd::{exp, exp_slice, vectorized};
+use crate::base::simd::{exp, exp_slice, vectorized};
 
 /// Above this `exp(-s)` is zero; bounding the factor of it by this keeps infinity times zero out.
 const LARGEST: f64 = 800.0;

@@ -1,0 +1,11 @@
+//! What has no subject of its own: errors, files written whole, random numbers, vector instructions, half precision.
+
+pub(crate) mod atomic_file;
+pub(crate) mod error;
+pub(crate) mod f16;
+pub(crate) mod random;
+pub(crate) mod simd;
+
+pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
+pub use error::{Error, Result};
+pub use random::{SplitMix64, golden_ratio_subset};

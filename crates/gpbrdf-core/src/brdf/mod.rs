@@ -1,0 +1,100 @@
+//! What a reflectance is: the trait, angles, tables, and the built-in materials.
+
+pub mod analytic;
+pub(crate) mod angles;
+pub(crate) mod materials;
+pub(crate) mod sigma;
+pub(crate) mod table;
+
+pub use angles::{BoxPoint, GRAZING_COSINE, HORIZON_COSINE, HalfDiff, direction, fold_phi_d, theta_d_max};
+pub use materials::{Material, material, materials};
+pub use sigma::SigmaTable;
+pub use table::{
+    BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, Trilinear, cell_center, cell_index,
+    cell_indices, mirrored_column,
+};
+
+use nalgebra::Vector3;
+
+/// Linear sRGB triple. For a BRDF its unit is sr^-1.
+pub type Rgb = [f64; 3];
+
+/// A bidirectional reflectance distribution function, isotropic, RGB.
+pub trait Brdf: Send + Sync {
+    /// `f(wi, wo)` in sr^-1, cosine not included, with unit directions away from the surface in the local
+    /// frame (normal +z). Zero in every channel when either direction lies at or below the horizon.
+    fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb;
+
+    /// `f` at half-difference angles.
+    fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
+        let (wi, wo) = angles.to_directions();
+        self.eval(&wi, &wo)
+    }
+
+    /// `f` at many half-difference angles, into as many places of `out`. This is what tables and samples are made with:
+    /// a model evaluates whole blocks of directions at a time, without an allocation per direction.
+    fn eval_many(&self, angles: &[HalfDiff], out: &mut [Rgb]) {
+        for (angles, out) in angles.iter().zip(out) {
+            *out = self.eval_half_diff(*angles);
+        }
+    }
+}
+
+/// A BRDF made symmetric and defined up to the horizon:
+/// `(f(a, b) + f(b, a)) / 2` where `a`, `b` are `wi`, `wo` lifted to a cosine of at least `min_cosine`.
+///
+/// Measured tables obey Helmholtz reciprocity only up to noise and say nothing at grazing angles; this is the
+/// truth that fits and metrics see.
+#[derive(Clone, Debug)]
+pub struct Reciprocal<B> {
+    /// The wrapped BRDF.
+    pub inner: B,
+    /// The smallest cosine at which `inner` is asked.
+    pub min_cosine: f64,
+}
+
+impl<B: Brdf> Brdf for Reciprocal<B> {
+    fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
+        let a = lift(wi, self.min_cosine);
+        let b = lift(wo, self.min_cosine);
+        let forward = self.inner.eval(&a, &b);
+        let backward = self.inner.eval(&b, &a);
+        std::array::from_fn(|c| 0.5 * (forward[c] + backward[c]))
+    }
+}
+
+/// The unit direction with the azimuth of `w` and a cosine of at least `min_cosine`.
+fn lift(w: &Vector3<f64>, min_cosine: f64) -> Vector3<f64> {
+    if w.z >= min_cosine {
+        return *w;
+    }
+    let horizontal = w.x.hypot(w.y);
+    if horizontal == 0.0 {
+        return Vector3::z();
+    }
+    let scale = (1.0 - min_cosine * min_cosine).sqrt() / horizontal;
+    Vector3::new(w.x * scale, w.y * scale, min_cosine)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Skewed;
+
+    impl Brdf for Skewed {
+        fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
+            [wi.z, 2.0 * wo.z, 1.0]
+        }
+    }
+
+    #[test]
+    fn reciprocal_is_symmetric_and_lifts_grazing_directions() {
+        let f = Reciprocal { inner: Skewed, min_cosine: 0.02 };
+        let a = Vector3::new(0.6, 0.0, 0.8);
+        let b = Vector3::new(0.0, 1.0, 0.0);
+        assert_eq!(f.eval(&a, &b), f.eval(&b, &a));
+        assert!((f.eval(&a, &b)[0] - 0.5 * (0.8 + 0.02)).abs() < 1e-15);
+        assert!((lift(&Vector3::new(0.6, -0.8, -1e-9), 0.02).norm() - 1.0).abs() < 1e-15);
+    }
+}

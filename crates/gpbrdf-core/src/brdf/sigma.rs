@@ -1,0 +1,62 @@
+//! The uncertainty of a table.
+
+use crate::base::error::{Error, Result};
+use crate::brdf::table::{BrdfTable, N_CELLS, Trilinear};
+
+/// Posterior standard deviation of the latent target at the centre of every cell, in target units: with the
+/// logarithmic transform 0.05 reads as five per cent. Cells below the horizon hold the value at the horizon.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SigmaTable {
+    planes: Vec<Vec<f32>>,
+}
+
+impl SigmaTable {
+    /// One plane in MERL order for all channels, or three.
+    ///
+    /// # Errors
+    /// Another number of planes, or of values in one than [`N_CELLS`].
+    pub fn from_planes(planes: Vec<Vec<f32>>) -> Result<Self> {
+        if !matches!(planes.len(), 1 | 3) {
+            return Err(Error::argument("planes of sigma", "1 or 3", planes.len()));
+        }
+        match planes.iter().find(|plane| plane.len() != N_CELLS) {
+            None => Ok(Self { planes }),
+            Some(plane) => Err(Error::argument("values of a plane", N_CELLS.to_string(), plane.len())),
+        }
+    }
+
+    /// One plane in MERL order where the channels share hyper-parameters, else one per channel.
+    #[must_use]
+    pub fn planes(&self) -> &[Vec<f32>] {
+        &self.planes
+    }
+
+    /// Sigma of one cell and channel.
+    #[must_use]
+    pub fn value(&self, cell: usize, channel: usize) -> f32 {
+        self.planes[channel.min(self.planes.len() - 1)][cell]
+    }
+
+    /// The largest sigma of one cell over the channels: what a single number stands for.
+    #[must_use]
+    pub fn largest(&self, cell: usize) -> f32 {
+        self.planes.iter().fold(0.0, |largest, plane| largest.max(plane[cell]))
+    }
+
+    /// Sigma of each channel by trilinear interpolation.
+    #[must_use]
+    pub fn lookup(&self, at: &Trilinear) -> [f32; 3] {
+        let mut sum = [0.0f32; 3];
+        for (cell, weight) in at.corners() {
+            sum.iter_mut().enumerate().for_each(|(c, sum)| *sum += weight * self.value(cell, c));
+        }
+        sum
+    }
+
+    /// Sigma of each channel as a table, to be looked up like one.
+    #[must_use]
+    pub fn to_table(&self) -> BrdfTable {
+        let cell = |cell| std::array::from_fn(|channel| self.value(cell, channel));
+        BrdfTable::from_cells((0..N_CELLS).map(cell).collect())
+    }
+}

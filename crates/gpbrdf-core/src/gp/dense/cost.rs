@@ -1,0 +1,117 @@
+//! What a dense run will take, told before it starts.
+
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use faer::Mat;
+
+use super::factor::{INVERSE_COLUMNS, factorize};
+use crate::base::error::{Error, Result};
+
+/// Forecast of a dense run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DenseCost {
+    /// Number of samples.
+    pub samples: usize,
+    /// Memory in bytes: the covariance matrix, `8 n^2`, and a strip of columns a thread.
+    pub bytes: f64,
+    /// Wall-clock time in seconds, for the speed measured once on a small matrix; within a factor of two or so.
+    pub seconds: f64,
+}
+
+/// Memory and time of one fit to `samples` samples with `channels` channels after `gradient_evaluations`
+/// evaluations of the log marginal likelihood and its gradient.
+///
+/// A fit takes `n^3 / 6` multiply-adds and `8 n^2` bytes, an evaluation with gradient `n^3 / 2`.
+#[must_use]
+pub fn dense_cost(samples: usize, channels: usize, gradient_evaluations: usize) -> DenseCost {
+    let n = samples as f64;
+    let evaluations = gradient_evaluations as f64;
+    let strips = (rayon::current_num_threads() * INVERSE_COLUMNS) as f64;
+    let cubic = n.powi(3) * (1.0 / 6.0 + 0.5 * evaluations) / multiply_adds_per_second();
+    // Assembly, contraction and solves: a few hundred instructions a pair.
+    let square = n * n * (20e-9 + 1e-9 * channels as f64) * (1.0 + evaluations);
+    DenseCost { samples, bytes: 8.0 * n * (n + strips), seconds: cubic + square }
+}
+
+impl DenseCost {
+    /// Refuses what needs more memory than is available.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] with the need, the limit and the time.
+    pub fn check(&self) -> Result<()> {
+        self.check_against(available_bytes())
+    }
+
+    fn check_against(&self, limit: f64) -> Result<()> {
+        const GIB: f64 = 1_073_741_824.0;
+        if self.bytes <= limit {
+            return Ok(());
+        }
+        Err(Error::TooLarge {
+            samples: self.samples,
+            need_gib: self.bytes / GIB,
+            limit_gib: limit / GIB,
+            need_seconds: self.seconds,
+        })
+    }
+}
+
+/// Assumed where the system does not tell: 4 GiB.
+const ASSUMED_BYTES: f64 = 4.0 * 1_073_741_824.0;
+
+/// Memory that can be had without swapping: `MemAvailable` of Linux, [`ASSUMED_BYTES`] elsewhere.
+fn available_bytes() -> f64 {
+    let parse = |text: String| {
+        let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?.trim();
+        let kib: f64 = line.strip_suffix("kB")?.trim().parse().ok()?;
+        Some(kib * 1024.0)
+    };
+    std::fs::read_to_string("/proc/meminfo").ok().and_then(parse).unwrap_or(ASSUMED_BYTES)
+}
+
+/// Speed of the factorisation on this machine, from one matrix of 1024 rows; measured on the first call (some
+/// twenty milliseconds).
+fn multiply_adds_per_second() -> f64 {
+    static SPEED: OnceLock<f64> = OnceLock::new();
+    *SPEED.get_or_init(|| {
+        const N: usize = 1024;
+        let matrix = Mat::<f64>::from_fn(N, N, |i, j| if i == j { 2.0 } else { 1.0 / (N as f64) });
+        let time = |_| {
+            let mut work = matrix.clone();
+            let start = Instant::now();
+            factorize(work.as_mut());
+            start.elapsed().as_secs_f64()
+        };
+        let seconds = (0..3).map(time).fold(f64::INFINITY, f64::min);
+        (N as f64).powi(3) / 6.0 / seconds.max(1e-6)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_quadratic_and_time_cubic() {
+        let cost = dense_cost(4096, 3, 0);
+        assert!(cost.bytes >= 8.0 * 4096.0 * 4096.0);
+        let ratio = dense_cost(1_000_000, 3, 0).bytes / dense_cost(500_000, 3, 0).bytes;
+        assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
+        assert!(cost.seconds > 0.01 && cost.seconds < 600.0, "{}", cost.seconds);
+        let ratio = dense_cost(100_000, 3, 1).seconds / dense_cost(50_000, 3, 1).seconds;
+        assert!(ratio > 6.0 && ratio <= 8.0, "{ratio}");
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused_with_both_figures() {
+        let cost = DenseCost { samples: 37_616, bytes: 3.0 * 1_073_741_824.0, seconds: 480.0 };
+        assert!(cost.check_against(3.5 * 1_073_741_824.0).is_ok());
+        let message = cost.check_against(2.0 * 1_073_741_824.0).unwrap_err().to_string();
+        for part in ["37616 samples", "at most 2.0 GiB", "need of 3.0 GiB", "480 s"] {
+            assert!(message.contains(part), "{message}");
+        }
+        assert!(dense_cost(100_000_000, 1, 1).check().is_err());
+        assert!(available_bytes() > 1e6);
+    }
+}

@@ -1,0 +1,286 @@
+//! Hyper-parameters of the dense process by maximum marginal likelihood.
+
+use crate::base::error::{Error, Result};
+use crate::base::random::golden_ratio_subset;
+use crate::gp::dense::{DenseEvaluator, DenseGp};
+use crate::gp::report::{FitReport, MIN_NOISE_RATIO, Noise};
+use crate::gp::{OptimizeOptions, Optimum, Parameter, maximize};
+use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
+
+/// A search for the hyper-parameters of a dense process with a sum of ARD kernels, one of each of `shapes`.
+#[derive(Clone, Copy, Debug)]
+pub struct DenseFit<'a> {
+    /// Coordinates of the samples, `n` rows of `metrics.len()`.
+    pub x: &'a [f64],
+    /// `n` zero-mean values for each channel; the channels share hyper-parameters.
+    pub targets: &'a [Vec<f64>],
+    /// How distance is measured along each coordinate.
+    pub metrics: &'a [AxisMetric],
+    /// Shapes of the kernel, summed.
+    pub shapes: &'a [Shape],
+    /// The rule for the noise variance.
+    pub noise: Noise,
+    /// How long to search.
+    pub options: &'a OptimizeOptions,
+}
+
+impl DenseFit<'_> {
+    /// Searches, and conditions at the result.
+    ///
+    /// The search runs over variances, length scales, mixture parameters and, with [`Noise::Optimized`], the noise
+    /// variance. It starts from the best of several optima on 160 of the samples, or from the usual start if that gets
+    /// further. One evaluation costs `n^3 / 2` multiply-adds, and there are some tens of them; see
+    /// [`dense_cost`](crate::gp::dense_cost) for a forecast. `evaluation` is called before each, and its error ends the
+    /// search.
+    ///
+    /// # Errors
+    /// Sizes that do not agree, values that are not finite, broken shapes or noise, more samples than fit in memory, and
+    /// those of `evaluation`.
+    pub fn run(&self, evaluation: &dyn Fn() -> Result<()>) -> Result<(DenseGp, FitReport)> {
+        let Self { x, targets, metrics, shapes, noise, options } = *self;
+        let channels = targets.len();
+        let n = targets.first().map_or(0, Vec::len);
+        if channels == 0 || targets.iter().any(|t| t.len() != n) {
+            return Err(Error::argument("dense targets", "channels of one length, at least one", channels));
+        }
+        if let Noise::Fixed(variance) = noise
+            && !(variance > 0.0 && variance.is_finite())
+        {
+            return Err(Error::argument("noise variance", "a positive number", variance));
+        }
+        shapes.iter().try_for_each(|shape| shape.validate())?;
+        let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
+        let data = Data { x, y: &y, dimension: metrics.len(), channels };
+        let mut problem = Problem::new(&data, metrics, shapes, noise);
+        let mut scouting = 0;
+        // A few samples tell good valleys from bad ones for next to nothing.
+        let scouts = OptimizeOptions { restarts: options.restarts.max(SCOUT_STARTS), ..*options };
+        let found = if n <= SCOUTS || n <= metrics.len() {
+            problem.search(&data, &scouts, evaluation)?
+        } else {
+            let (x, y) = data.thinned(SCOUTS);
+            let thin = Data { x: &x, y: &y, ..data };
+            let small = Problem::new(&thin, metrics, shapes, noise);
+            let scout = small.search(&thin, &scouts, evaluation)?;
+            // What is best for a few may be worse for all than the usual start, so both run: to the end if that is quick.
+            let most = if n <= FEW { u64::MAX } else { LAP };
+            let lap =
+                OptimizeOptions { max_iterations: most.min(options.max_iterations), restarts: 0, ..*options };
+            let usual = problem.search(&data, &lap, evaluation)?;
+            problem.start_from(&scout.log_parameters);
+            let scouted = problem.search(&data, &lap, evaluation)?;
+            scouting = scout.evaluations + usual.evaluations + scouted.evaluations;
+            let ahead = if usual.value > scouted.value { usual } else { scouted };
+            problem.start_from(&ahead.log_parameters);
+            problem.search(&data, options, evaluation)?
+        };
+        problem.kernel.set_log_parameters(&found.log_parameters[..problem.kernel.n_parameters()])?;
+        let noise_variance = problem.noise_of(&found.log_parameters);
+        let gp = DenseGp::fit_at(x, &y, channels, problem.kernel, noise_variance)?;
+        let report = FitReport {
+            log_marginal_likelihood: found.value,
+            evaluations: found.evaluations + scouting,
+            converged: found.converged,
+            at_bound: found.at_bound,
+        };
+        Ok((gp, report))
+    }
+}
+
+/// Samples of the first search, from several starts.
+const SCOUTS: usize = 160;
+
+/// So many samples are searched in about a second.
+const FEW: usize = 1000;
+
+/// Iterations on more samples after which the better of two starts goes on alone.
+const LAP: u64 = 15;
+
+/// Starts of that search besides the usual one.
+const SCOUT_STARTS: usize = 4;
+
+/// Samples: rows of coordinates, and values `[sample][channel]`.
+#[derive(Clone, Copy)]
+struct Data<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    dimension: usize,
+    channels: usize,
+}
+
+impl Data<'_> {
+    /// `count` samples spread evenly over the order.
+    fn thinned(&self, count: usize) -> (Vec<f64>, Vec<f64>) {
+        let order = golden_ratio_subset(self.y.len() / self.channels, count);
+        let pick = |of: &[f64], width: usize| {
+            order.iter().flat_map(|i| of[i * width..(i + 1) * width].iter().copied()).collect()
+        };
+        (pick(self.x, self.dimension), pick(self.y, self.channels))
+    }
+}
+
+/// What is searched: a kernel's log-parameters and, where it is free, the noise variance.
+struct Problem {
+    kernel: Kernel,
+    noise: Noise,
+    parameters: Vec<Parameter>,
+}
+
+impl Problem {
+    fn new(data: &Data<'_>, metrics: &[AxisMetric], shapes: &[Shape], noise: Noise) -> Self {
+        let values = data.y.len();
+        let variance = (data.y.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64).max(1e-12);
+        let extents: Vec<f64> =
+            (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
+        let kernel = starting_kernel(&extents, metrics, shapes, variance);
+        let mut parameters = parameters(&kernel, &extents, values / data.channels, variance);
+        if noise == Noise::Optimized {
+            parameters.push(Parameter {
+                name: "noise_variance".into(),
+                start: (1e-3 * variance).ln(),
+                lower: (MIN_NOISE_RATIO * variance).ln(),
+                upper: (10.0 * variance).ln(),
+            });
+        }
+        Self { kernel, noise, parameters }
+    }
+
+    fn start_from(&mut self, log_parameters: &[f64]) {
+        for (parameter, start) in self.parameters.iter_mut().zip(log_parameters) {
+            parameter.start = start.clamp(parameter.lower, parameter.upper);
+        }
+    }
+
+    fn noise_of(&self, log_parameters: &[f64]) -> f64 {
+        match self.noise {
+            Noise::Optimized => log_parameters[self.kernel.n_parameters()].exp(),
+            Noise::Fixed(variance) => variance,
+        }
+    }
+
+    fn search(
+        &self,
+        data: &Data<'_>,
+        options: &OptimizeOptions,
+        evaluation: &dyn Fn() -> Result<()>,
+    ) -> Result<Optimum> {
+        let mut evaluator = DenseEvaluator::new(data.x, data.dimension, data.y, data.channels)?;
+        let mut kernel = self.kernel.clone();
+        let count = kernel.n_parameters();
+        maximize(&self.parameters, data.y.len(), options, |p| {
+            evaluation()?;
+            kernel.set_log_parameters(&p[..count])?;
+            let mut at = evaluator.evaluate_with_gradient(&kernel, self.noise_of(p))?;
+            at.gradient.truncate(p.len());
+            Ok((at.log_marginal_likelihood, at.gradient))
+        })
+    }
+}
+
+/// The extent of coordinate `k`, at least a small positive number.
+fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
+    match metric {
+        AxisMetric::Chord => 1.0,
+        AxisMetric::Linear => {
+            let column = || x.iter().skip(k).step_by(dimension).copied();
+            let (low, high) =
+                (column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max));
+            (high - low).max(1e-3)
+        }
+    }
+}
+
+fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], variance: f64) -> Kernel {
+    let share = variance / shapes.len().max(1) as f64;
+    let terms = shapes.iter().enumerate().map(|(i, &shape)| {
+        // Terms of one shape need different starts to become different.
+        let fraction = 0.5 * 0.5f64.powi(i32::try_from(i).unwrap_or(30));
+        let length_scale = extents.iter().map(|extent| fraction * extent).collect();
+        KernelTerm { variance: share, body: KernelBody::Ard { shape, length_scale } }
+    });
+    Kernel { terms: terms.collect(), metric: metrics.to_vec() }
+}
+
+fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -> Vec<Parameter> {
+    // Below the spacing of the samples a length scale means nothing.
+    let spacing = (samples as f64).powf(-1.0 / extents.len().max(1) as f64).min(0.5);
+    let kinds = kernel.parameter_kinds().into_iter();
+    kinds
+        .zip(kernel.parameter_names())
+        .zip(kernel.log_parameters())
+        .map(|((kind, name), start)| {
+            let (lower, upper) = match kind {
+                ParameterKind::Variance => (1e-4 * variance, 1e6 * variance),
+                ParameterKind::LengthScale(k) => (0.5 * spacing * extents[k], 30.0 * extents[k]),
+                ParameterKind::Alpha => (0.05, 1e3),
+                ParameterKind::Weight => (1e-5, 1e5),
+            };
+            Parameter { name, start, lower: lower.ln(), upper: upper.ln() }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A smooth function of two coordinates with noise of a known size, on a quasi-random set.
+    fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
+        let mut random = crate::base::random::SplitMix64::new(2);
+        let x: Vec<f64> = (0..2 * n).map(|_| random.next_unit()).collect();
+        let noise = |r: &mut crate::base::random::SplitMix64| {
+            0.05 * (0..12).map(|_| r.next_unit() - 0.5).sum::<f64>()
+        };
+        let y = x.chunks(2).map(|p| (4.0 * p[0]).sin() + 0.1 * p[1] + noise(&mut random)).collect();
+        (x, y)
+    }
+
+    #[test]
+    fn recovers_noise_and_relevance() {
+        let (x, y) = data(150);
+        let metrics = [AxisMetric::Linear; 2];
+        let shapes = [Shape::SquaredExponential];
+        let options = OptimizeOptions::default();
+        let fit = DenseFit {
+            x: &x,
+            targets: &[y],
+            metrics: &metrics,
+            shapes: &shapes,
+            noise: Noise::Optimized,
+            options: &options,
+        };
+        let (gp, report) = fit.run(&|| Ok(())).unwrap();
+        assert!(report.converged, "{report:?}");
+        assert!((gp.noise_variance().sqrt() - 0.05).abs() < 0.01, "{}", gp.noise_variance().sqrt());
+        let KernelBody::Ard { length_scale, .. } = &gp.kernel().terms[0].body else { unreachable!() };
+        assert!(length_scale[1] > 3.0 * length_scale[0], "{length_scale:?}");
+        assert!((gp.log_marginal_likelihood().unwrap() - report.log_marginal_likelihood).abs() < 1e-6);
+    }
+
+    #[test]
+    fn fixed_noise_stays_and_broken_input_is_refused() {
+        let (x, y) = data(40);
+        let metrics = [AxisMetric::Linear; 2];
+        let options = OptimizeOptions::default();
+        let shapes = [Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }];
+        let both = [y.clone(), y.iter().map(|y| -y).collect()];
+        let good = DenseFit {
+            x: &x,
+            targets: &both,
+            metrics: &metrics,
+            shapes: &shapes,
+            noise: Noise::Fixed(0.01),
+            options: &options,
+        };
+        let (gp, _) = good.run(&|| Ok(())).unwrap();
+        assert_eq!((gp.noise_variance(), gp.channels(), gp.n_samples()), (0.01, 2, 40));
+        let y = std::slice::from_ref(&y);
+        for broken in [
+            DenseFit { targets: &[], noise: Noise::Optimized, ..good },
+            DenseFit { targets: y, noise: Noise::Fixed(-1.0), ..good },
+            DenseFit { x: &x[1..], targets: y, noise: Noise::Optimized, ..good },
+        ] {
+            assert!(broken.run(&|| Ok(())).is_err(), "{broken:?}");
+        }
+    }
+}

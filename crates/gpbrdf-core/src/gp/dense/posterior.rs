@@ -1,0 +1,181 @@
+//! The dense process as a posterior of a model.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::DenseGp;
+use super::fit::DenseFit;
+use crate::base::error::Result;
+use crate::brdf::angles::HalfDiff;
+use crate::gp::hyper::Hyper;
+use crate::gp::posterior::{DeviceForm, Fitted, KernelSum, Posterior};
+use crate::gp::solver::{Problem, Solver};
+use crate::gp::tensors::{TensorReader, TensorWriter};
+use crate::kernel::{Kernel, KernelBody};
+use crate::sample::lattice::LatticeLayout;
+use crate::sample::space::InputSpace;
+
+/// The solver's name in files and reports.
+pub(crate) const NAME: &str = "dense";
+
+/// A dense process and the space of its inputs.
+#[derive(Debug)]
+struct DensePosterior {
+    gp: DenseGp,
+    space: InputSpace,
+}
+
+/// Finds hyper-parameters by maximum marginal likelihood and conditions. The first axis's shapes are those of the joint
+/// distance.
+pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
+    let (space, points) = inputs(problem)?;
+    let search = DenseFit {
+        x: points.as_flattened(),
+        targets: &problem.targets,
+        metrics: &space.metrics(),
+        shapes: &problem.kernel[0],
+        noise: problem.noise,
+        options: problem.optimize,
+    };
+    let (gp, report) = search.run(&|| problem.watch.evaluation())?;
+    Ok((Arc::new(DensePosterior { gp, space }), report))
+}
+
+/// Conditions at known hyper-parameters.
+pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
+    let (space, points) = inputs(problem)?;
+    let targets = &problem.targets;
+    let y: Vec<f64> = (0..points.len()).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
+    let gp = DenseGp::fit_at(
+        points.as_flattened(),
+        &y,
+        targets.len(),
+        hyper.kernel.clone(),
+        hyper.noise_variance,
+    )?;
+    let value = gp.log_marginal_likelihood()?;
+    Ok((Arc::new(DensePosterior { gp, space }), value))
+}
+
+/// The coordinates of the samples, and their space: that of the lattice, if they stand on one.
+fn inputs(problem: &Problem<'_>) -> Result<(InputSpace, Vec<[f64; 3]>)> {
+    let space = problem.lattice.map_or(problem.space, |lattice: &LatticeLayout| lattice.space().into());
+    space.validate()?;
+    Ok((space, problem.angles.iter().map(|&angles| space.coordinates(angles)).collect()))
+}
+
+/// A saved process, but for its tensors.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    space: InputSpace,
+    kernel: Kernel,
+    noise_variance: f64,
+    jitter: f64,
+    channels: usize,
+}
+
+/// Reads what [`Posterior::save`] has written.
+pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
+    let Header { space, kernel, noise_variance, jitter, channels } = tensors.header(header)?;
+    space.validate().map_err(|e| tensors.damaged(e))?;
+    if kernel.dimension() != 3 {
+        return Err(tensors.wrong("a kernel of 3 coordinates", kernel.dimension().to_string()));
+    }
+    let (x, targets, weights) = (tensors.read("x")?, tensors.read("targets")?, tensors.read("weights")?);
+    let gp = DenseGp::from_weights(&x, &targets, &weights, channels, kernel, noise_variance, jitter);
+    Ok(Arc::new(DensePosterior { gp: gp.map_err(|e| tensors.damaged(e))?, space }))
+}
+
+impl DensePosterior {
+    fn points(&self, angles: &[HalfDiff]) -> Vec<[f64; 3]> {
+        angles.iter().map(|&angles| self.space.coordinates(angles)).collect()
+    }
+}
+
+impl Posterior for DensePosterior {
+    fn solver(&self) -> &'static str {
+        NAME
+    }
+
+    fn label(&self) -> &'static str {
+        "Exact, dense"
+    }
+
+    fn space(&self) -> InputSpace {
+        self.space
+    }
+
+    fn n_channels(&self) -> usize {
+        self.gp.channels()
+    }
+
+    fn n_data(&self) -> usize {
+        self.gp.n_samples()
+    }
+
+    fn n_floats(&self) -> usize {
+        self.gp.n_samples() * (3 + self.gp.channels()) + self.gp.kernel().n_parameters() + 1
+    }
+
+    fn noise_variances(&self) -> Vec<f64> {
+        vec![self.gp.noise_variance(); self.gp.channels()]
+    }
+
+    fn predict_mean(&self, angles: &[HalfDiff]) -> Vec<f64> {
+        self.gp.mean_at(self.points(angles).as_flattened())
+    }
+
+    fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
+        self.gp.predict_variance_latent(self.points(angles).as_flattened())
+    }
+
+    fn hyper(&self) -> Option<Hyper> {
+        let (kernel, noise_variance) = (self.gp.kernel().clone(), self.gp.noise_variance());
+        Some(Hyper { solver: Solver::Dense, kernel, noise_variance })
+    }
+
+    fn kernel_name(&self) -> String {
+        self.gp.kernel().name()
+    }
+
+    fn report(&self) -> Value {
+        let lengths = self.gp.kernel().terms.iter().map(|term| match &term.body {
+            KernelBody::Ard { length_scale, .. } => json!(length_scale),
+            KernelBody::Product(axes) => json!(axes),
+        });
+        let mut lengths: Vec<Value> = lengths.collect();
+        json!({
+            "length_scale": if lengths.len() == 1 { lengths.remove(0) } else { Value::Array(lengths) },
+            "signal_variance": self.gp.kernel().prior_variance(),
+            "noise_variance": self.gp.noise_variance(),
+            "jitter": self.gp.jitter(),
+            "terms": self.gp.kernel(),
+        })
+    }
+
+    fn save(&self, tensors: &mut TensorWriter) -> Result<Value> {
+        let (n, channels) = (self.gp.n_samples(), self.gp.channels());
+        tensors.add("x", &[n, 3], self.gp.inputs());
+        tensors.add("targets", &[n, channels], &self.gp.targets());
+        tensors.add("weights", &[n, channels], &self.gp.weights());
+        crate::gp::tensors::header(&Header {
+            space: self.space,
+            kernel: self.gp.kernel().clone(),
+            noise_variance: self.gp.noise_variance(),
+            jitter: self.gp.jitter(),
+            channels,
+        })
+    }
+
+    fn device_form(&self) -> DeviceForm<'_> {
+        DeviceForm::KernelSum(KernelSum {
+            kernel: self.gp.kernel(),
+            space: self.space,
+            inputs: self.gp.inputs(),
+            weights: self.gp.weights(),
+            n_channels: self.gp.channels(),
+        })
+    }
+}

@@ -1,0 +1,218 @@
+//! The inducing lattice: a sparse process whose few stored numbers are values at the nodes of a lattice.
+//!
+//! Three components, one for each column of a colour matrix, have a lattice each. Given its values a component is an
+//! exact lattice process without noise, so means and variances are those of [`LatticeGp`]: `k(x, Z) K_ZZ^-1 m` and
+//! `s^2 (k(x, x) - k(x, Z) K_ZZ^-1 k(Z, x))`. The variance leaves out what is not known about the values themselves;
+//! with thousands of cells to a node that is far below what lies between the nodes.
+
+pub(crate) mod cell_grid;
+pub(crate) mod fit;
+mod heavy_tails;
+pub(crate) mod posterior;
+mod regression;
+
+use serde::{Deserialize, Serialize};
+
+use self::regression::CardinalAxis;
+use crate::base::error::{Error, Result};
+use crate::gp::lattice::{LatticeData, LatticeGp, LatticeHyper};
+use crate::gp::report::MIN_NOISE_RATIO;
+use crate::kernel::Kernel1d;
+use crate::sample::space::WarpedBox;
+
+/// Shape, space and hyper-parameters of the lattice of one component: all but its values.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InducingShape {
+    /// Nodes along `u`, `v`, `phi`.
+    pub shape: [usize; 3],
+    /// The warped box with this component's own densities; nodes are even in its coordinates.
+    pub space: WarpedBox,
+    /// The kernel of each axis.
+    pub kernels: [Kernel1d; 3],
+    /// `s^2`, in squared target units.
+    pub signal_variance: f64,
+    /// Variance of the residuals that the signal does not account for, in squared target units.
+    pub noise_variance: f64,
+}
+
+impl InducingShape {
+    /// Kernel coordinates of the nodes along the three axes.
+    ///
+    /// Along `u` they go from the specular peak's first cell to `theta_h = pi/2`, along `v` from 0 to the horizon, both
+    /// ends included; along `phi` they keep half a step off the ends. A single node stands in the middle.
+    #[must_use]
+    pub fn nodes(&self) -> [Vec<f64>; 3] {
+        let [a, b, c] = self.shape;
+        let between = |low: f64, high: f64, n: usize| -> Vec<f64> {
+            if n == 1 {
+                return vec![0.5 * (low + high)];
+            }
+            (0..n).map(|i| low + (high - low) * i as f64 / (n - 1) as f64).collect()
+        };
+        let first = self.space.warp_u(0.5 / crate::brdf::table::N_THETA_H as f64);
+        let period = self.space.symmetry.phi_extent();
+        let phi = (0..c).map(|i| (i as f64 + 0.5) / c as f64 * period).collect();
+        [between(first, self.space.warp_u(1.0), a), between(0.0, 1.0, b), phi]
+    }
+
+    /// Number of nodes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Whether there is no node.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Cardinal functions of the three axes at points given by their kernel coordinates.
+    ///
+    /// # Errors
+    /// Nodes too close for their kernel.
+    pub(crate) fn cardinal(&self, points: [&[f64]; 3]) -> Result<[CardinalAxis; 3]> {
+        let nodes = self.nodes();
+        let (metrics, mirrored) = (self.space.lattice_metrics(), self.space.mirrored());
+        let axis =
+            |k: usize| CardinalAxis::new(&self.kernels[k], metrics[k], mirrored[k], points[k], &nodes[k]);
+        Ok([axis(0)?, axis(1)?, axis(2)?])
+    }
+
+    fn validate(&self) -> Result<()> {
+        self.space.validate()?;
+        check_shape(self.shape)
+    }
+}
+
+/// The most nodes of one lattice: the normal matrix of more takes gigabytes.
+pub(crate) const MAX_NODES: usize = 12_000;
+
+/// Checks the sides of an inducing lattice.
+///
+/// # Errors
+/// An empty side, or more than 12,000 nodes.
+pub(crate) fn check_shape(shape: [usize; 3]) -> Result<()> {
+    let nodes = shape.iter().try_fold(1usize, |n, &side| n.checked_mul(side));
+    match nodes {
+        Some(1..=MAX_NODES) if shape.iter().all(|&side| side <= 512) => Ok(()),
+        _ => {
+            let [a, b, c] = shape;
+            let expected = format!("1 to 512 nodes along each axis and at most {MAX_NODES} in all");
+            Err(Error::argument("inducing lattice", expected, format!("{a}x{b}x{c}")))
+        }
+    }
+}
+
+/// One component: a lattice and the process that its values define.
+#[derive(Clone, Debug)]
+pub struct InducingComponent {
+    lattice: InducingShape,
+    gp: LatticeGp,
+}
+
+impl InducingComponent {
+    /// The process with these values at the nodes, `[A][B][C]`.
+    ///
+    /// # Errors
+    /// A broken lattice, values of the wrong number or not finite.
+    pub fn new(lattice: InducingShape, values: Vec<f64>) -> Result<Self> {
+        lattice.validate()?;
+        let data = LatticeData {
+            coordinates: lattice.nodes(),
+            metrics: lattice.space.lattice_metrics(),
+            mirrored: lattice.space.mirrored(),
+            targets: values,
+            channels: 1,
+        };
+        data.validate()?;
+        let hyper = LatticeHyper {
+            signal_variance: lattice.signal_variance,
+            noise_variance: MIN_NOISE_RATIO * lattice.signal_variance,
+            kernels: lattice.kernels.clone(),
+        };
+        if !(lattice.noise_variance > 0.0 && lattice.noise_variance.is_finite()) {
+            return Err(Error::argument("noise variance", "a positive number", lattice.noise_variance));
+        }
+        hyper.validate()?;
+        let axes = lattice.cardinal([&[], &[], &[]])?;
+        let weights =
+            crate::gp::contract(axes.each_ref().map(|axis| axis.inverse.as_ref()), &data.targets, 1);
+        Ok(Self { gp: LatticeGp::from_weights(data, hyper, weights)?, lattice })
+    }
+
+    /// Shape, space and hyper-parameters.
+    #[must_use]
+    pub fn lattice(&self) -> &InducingShape {
+        &self.lattice
+    }
+
+    /// Values at the nodes, `[A][B][C]`: the numbers that are stored, each of them exact in half precision after a fit.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.gp.data().targets
+    }
+
+    /// The exact lattice process given the values: the component's mean and variance, with its bases and coefficients.
+    /// Its own noise variance is a jitter only.
+    #[must_use]
+    pub fn gp(&self) -> &LatticeGp {
+        &self.gp
+    }
+
+    /// Numbers that the component stores: values, shapes' densities, length scales and variances.
+    #[must_use]
+    pub fn floats(&self) -> usize {
+        self.values().len() + COMPONENT_CONSTANTS
+    }
+}
+
+/// Stored with a component besides its values: three densities, three length scales, two variances.
+pub(crate) const COMPONENT_CONSTANTS: usize = 8;
+
+/// Stored with all components: the colour matrix.
+pub(crate) const COLOUR_CONSTANTS: usize = 9;
+
+/// Stored with a model whatever its solver: the prior means.
+pub(crate) const PRIOR_MEANS: usize = 3;
+
+/// The inducing lattices of a material: `target_c = offset_c + sum_k mix_ck component_k`.
+#[derive(Clone, Debug)]
+pub struct InducingGp {
+    /// Orthogonal: column `k` is the colour of component `k`.
+    pub mix: [[f64; 3]; 3],
+    /// The components, that of the largest variance first.
+    pub components: Vec<InducingComponent>,
+    /// Cells that the values were fitted to.
+    pub cells: usize,
+}
+
+impl InducingGp {
+    /// Checks that there are three components of one symmetry and a finite colour matrix.
+    ///
+    /// # Errors
+    /// Otherwise.
+    pub fn validate(&self) -> Result<()> {
+        if self.components.len() != 3 {
+            return Err(Error::argument("components", "3", self.components.len()));
+        }
+        let symmetry = self.components[0].lattice.space.symmetry;
+        if self.components.iter().any(|c| c.lattice.space.symmetry != symmetry) {
+            return Err(Error::argument("symmetry of components", "the same for all", "a mixture"));
+        }
+        match self.mix.as_flattened().iter().find(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(bad) => Err(Error::argument("colour matrix", "finite numbers", bad)),
+        }
+    }
+
+    /// Colours out of components.
+    pub(crate) fn colour(&self, components: [f64; 3]) -> [f64; 3] {
+        self.mix.map(|row| row.iter().zip(components).map(|(m, x)| m * x).sum())
+    }
+
+    /// Variances of colours out of independent variances of components.
+    pub(crate) fn colour_variance(&self, components: [f64; 3]) -> [f64; 3] {
+        self.mix.map(|row| row.iter().zip(components).map(|(m, x)| m * m * x).sum())
+    }
+}

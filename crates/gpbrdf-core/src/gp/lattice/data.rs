@@ -1,0 +1,167 @@
+//! Samples on a product lattice, and the covariances of its axes.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
+use faer::{Mat, Par};
+
+use crate::base::error::{Error, Result};
+use crate::kernel::{AxisMetric, Kernel1d};
+
+/// Coordinates and targets on a lattice: what a lattice process is fitted to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LatticeData {
+    /// Kernel coordinates of the nodes along each axis.
+    pub coordinates: [Vec<f64>; 3],
+    /// How distance is measured along each axis.
+    pub metrics: [AxisMetric; 3],
+    /// Whether functions of each axis are even: the kernel is then `k(x, y) + k(x, -y)`. With the chord metric they
+    /// are even about `pi/2` too, and the process is that of the whole circle given mirrored targets.
+    pub mirrored: [bool; 3],
+    /// `[channel][A][B][C]`, last axis fastest; zero mean.
+    pub targets: Vec<f64>,
+    /// Number of channels; they share hyper-parameters.
+    pub channels: usize,
+}
+
+impl LatticeData {
+    /// Nodes along each axis.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 3] {
+        [self.coordinates[0].len(), self.coordinates[1].len(), self.coordinates[2].len()]
+    }
+
+    /// Number of nodes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.shape().iter().product()
+    }
+
+    /// Whether there is no node.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Checks sizes and finiteness.
+    ///
+    /// # Errors
+    /// An empty axis, a number of targets other than `channels A B C`, a coordinate or target that is not finite.
+    pub fn validate(&self) -> Result<()> {
+        if self.is_empty() || self.targets.len() != self.channels * self.len() || self.channels == 0 {
+            let expected = format!("{} channels x {} nodes, at least one of each", self.channels, self.len());
+            return Err(Error::argument("lattice targets", expected, self.targets.len()));
+        }
+        if let Some(bad) =
+            self.targets.iter().chain(self.coordinates.iter().flatten()).find(|x| !x.is_finite())
+        {
+            return Err(Error::argument("lattice targets and coordinates", "finite numbers", bad));
+        }
+        Ok(())
+    }
+
+    /// Every second node along each axis: an eighth of the work for a first guess at the hyper-parameters.
+    #[must_use]
+    pub(crate) fn decimated(&self) -> Self {
+        let [_, b, c] = self.shape();
+        let coordinates =
+            self.coordinates.each_ref().map(|x| x.iter().copied().step_by(2).collect::<Vec<_>>());
+        let mut targets = Vec::with_capacity(self.targets.len() / 8 + 1);
+        for tensor in self.targets.chunks(self.len()) {
+            for plane in tensor.chunks(b * c).step_by(2) {
+                for row in plane.chunks(c).step_by(2) {
+                    targets.extend(row.iter().step_by(2));
+                }
+            }
+        }
+        Self { coordinates, metrics: self.metrics, mirrored: self.mirrored, targets, channels: self.channels }
+    }
+
+    /// The mirror image of a coordinate of axis `k`, where there is one.
+    pub(super) fn image(&self, k: usize, x: f64) -> Option<f64> {
+        self.mirrored[k].then_some(-x)
+    }
+
+    /// `k(x, x)` of axis `k`.
+    pub(super) fn axis_variance(&self, k: usize, kernel: &Kernel1d, x: f64) -> f64 {
+        let image = self.image(k, x).map(|image| kernel.value(self.metrics[k].distance(x, image)));
+        kernel.value(0.0) + image.unwrap_or(0.0)
+    }
+
+    /// The covariance of axis `k` and its derivatives in the kernel's log-parameters.
+    pub(super) fn gram(&self, k: usize, kernel: &Kernel1d, derivatives: bool) -> (Mat<f64>, Vec<Mat<f64>>) {
+        let (x, metric) = (&self.coordinates[k], self.metrics[k]);
+        let n = x.len();
+        let count = if derivatives { kernel.n_parameters() } else { 0 };
+        let mut gram = Mat::zeros(n, n);
+        let mut slopes = vec![Mat::zeros(n, n); count];
+        let mut row = vec![0.0; count];
+        for j in 0..n {
+            for i in j..n {
+                row.fill(0.0);
+                let mut value = 0.0;
+                for other in std::iter::once(x[j]).chain(self.image(k, x[j])) {
+                    let distance = metric.distance(x[i], other);
+                    value += if derivatives {
+                        kernel.add_gradient(distance, 1.0, &mut row)
+                    } else {
+                        kernel.value(distance)
+                    };
+                }
+                gram[(i, j)] = value;
+                gram[(j, i)] = value;
+                for (slope, &d) in slopes.iter_mut().zip(&row) {
+                    slope[(i, j)] = d;
+                    slope[(j, i)] = d;
+                }
+            }
+        }
+        (gram, slopes)
+    }
+
+    /// Eigendecompositions of the three axes, and the derivatives of their covariances.
+    pub(super) fn eigen(
+        &self,
+        kernels: &[Kernel1d; 3],
+        derivatives: bool,
+    ) -> Result<([AxisEigen; 3], AxisSlopes)> {
+        let axis = |k: usize| -> Result<_> {
+            let (gram, slopes) = self.gram(k, &kernels[k], derivatives);
+            Ok((AxisEigen::new(&gram)?, slopes))
+        };
+        let (u, (v, phi)) = rayon::join(|| axis(0), || rayon::join(|| axis(1), || axis(2)));
+        let ((u, du), (v, dv), (phi, dphi)) = (u?, v?, phi?);
+        Ok(([u, v, phi], [du, dv, dphi]))
+    }
+}
+
+/// Eigendecomposition of one axis's covariance.
+#[derive(Clone, Debug)]
+pub(crate) struct AxisEigen {
+    pub(crate) vectors: Mat<f64>,
+    pub(crate) values: Vec<f64>,
+}
+
+/// For each axis the derivatives of its covariance in the log-parameters of its kernel.
+pub(super) type AxisSlopes = [Vec<Mat<f64>>; 3];
+
+impl AxisEigen {
+    pub(super) fn new(gram: &Mat<f64>) -> Result<Self> {
+        let n = gram.nrows();
+        let mut vectors = Mat::zeros(n, n);
+        let mut values = faer::diag::Diag::zeros(n);
+        let scratch =
+            self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, Default::default());
+        self_adjoint_evd(
+            gram.as_ref(),
+            values.as_mut(),
+            Some(vectors.as_mut()),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+            Default::default(),
+        )
+        .map_err(|_| Error::argument("covariance of an axis", "finite entries", "no eigendecomposition"))?;
+        // Rounding leaves the smallest eigenvalues of smooth kernels slightly negative.
+        let values = values.column_vector().iter().map(|x| x.max(0.0)).collect();
+        Ok(Self { vectors, values })
+    }
+}

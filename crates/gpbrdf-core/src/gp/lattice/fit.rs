@@ -1,0 +1,155 @@
+//! Hyper-parameters of the lattice process by maximum marginal likelihood.
+
+use crate::base::error::{Error, Result};
+use crate::gp::lattice::{LatticeData, LatticeGp, LatticeHyper};
+use crate::gp::report::{AXIS_NAMES, FitReport, MIN_NOISE_RATIO, Noise};
+use crate::gp::{OptimizeOptions, Optimum, Parameter, maximize};
+use crate::kernel::{Kernel1d, ParameterKind};
+
+/// Fits a lattice process; the search starts from the parameters of `kernels`.
+///
+/// With [`Noise::Optimized`] the signal variance is profiled out and the search runs over the kernels and the ratio
+/// of noise to signal; with [`Noise::Fixed`] over the kernels and the signal variance. Large lattices are first fitted
+/// on every second node of each axis, which costs an eighth. One evaluation is `O(n (A + B + C))`; `evaluation` is called
+/// before each, and its error ends the search.
+///
+/// # Errors
+/// Broken data, kernels or noise, and those of `evaluation`.
+pub fn fit_lattice(
+    data: LatticeData,
+    kernels: &[Kernel1d; 3],
+    noise: Noise,
+    options: &OptimizeOptions,
+    evaluation: &dyn Fn() -> Result<()>,
+) -> Result<(LatticeGp, FitReport)> {
+    data.validate()?;
+    kernels.iter().try_for_each(Kernel1d::validate)?;
+    if let Noise::Fixed(variance) = noise
+        && !(variance > 0.0 && variance.is_finite())
+    {
+        return Err(Error::argument("noise variance", "a positive number", variance));
+    }
+    let variance = data.targets.iter().map(|y| y * y).sum::<f64>() / data.targets.len() as f64;
+    let mut problem = Problem { kernels: kernels.clone(), noise };
+    let mut parameters = problem.parameters(&data, variance.max(1e-12));
+    let mut evaluations = 0;
+    if data.len() >= 4096 && data.shape().iter().all(|&n| n >= 12) {
+        let coarse = data.decimated();
+        let loose = OptimizeOptions { gradient_tolerance: 1e-2, gain_tolerance: 1e-4, ..*options };
+        let found = problem.search(&parameters, &coarse, &loose, evaluation)?;
+        evaluations += found.evaluations;
+        for (parameter, start) in parameters.iter_mut().zip(found.log_parameters) {
+            parameter.start = start;
+        }
+    }
+    let single = OptimizeOptions { restarts: if evaluations > 0 { 0 } else { options.restarts }, ..*options };
+    let found = problem.search(&parameters, &data, &single, evaluation)?;
+    evaluations += found.evaluations;
+    let hyper = problem.hyper(&data, &found.log_parameters)?;
+    let report = FitReport {
+        log_marginal_likelihood: found.value,
+        evaluations,
+        converged: found.converged,
+        at_bound: found.at_bound,
+    };
+    Ok((LatticeGp::new(data, hyper)?, report))
+}
+
+/// Kernels with their current log-parameters, and the rule for the noise.
+struct Problem {
+    kernels: [Kernel1d; 3],
+    noise: Noise,
+}
+
+impl Problem {
+    /// All parameters with start and bounds: the three kernels, then the noise ratio or the signal variance.
+    fn parameters(&self, data: &LatticeData, variance: f64) -> Vec<Parameter> {
+        let mut parameters = Vec::new();
+        for (k, kernel) in self.kernels.iter().enumerate() {
+            let x = &data.coordinates[k];
+            let extent = x.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+                - x.iter().copied().fold(f64::INFINITY, f64::min);
+            let extent = extent.max(f64::MIN_POSITIVE.sqrt());
+            let kinds = kernel.parameter_kinds(k).into_iter();
+            for ((kind, name), start) in kinds.zip(kernel.parameter_names()).zip(kernel.log_parameters()) {
+                let (lower, upper) = match kind {
+                    // Below the spacing of the nodes a length scale means nothing.
+                    ParameterKind::LengthScale(_) => (0.7 * extent / x.len() as f64, 20.0 * extent),
+                    ParameterKind::Alpha => (0.05, 1e3),
+                    ParameterKind::Weight | ParameterKind::Variance => (1e-5, 1e5),
+                };
+                let name = format!("{}.{name}", AXIS_NAMES[k]);
+                parameters.push(Parameter { name, start, lower: lower.ln(), upper: upper.ln() });
+            }
+        }
+        parameters.push(match self.noise {
+            Noise::Optimized => Parameter {
+                name: "noise_ratio".into(),
+                start: 1e-4f64.ln(),
+                lower: MIN_NOISE_RATIO.ln(),
+                upper: 10f64.ln(),
+            },
+            Noise::Fixed(noise) => Parameter {
+                name: "signal_variance".into(),
+                start: variance.ln(),
+                lower: (1e-4 * variance).max(noise * 1e-1).ln(),
+                upper: (1e6 * variance).max(noise * 1e1).min(noise / MIN_NOISE_RATIO).ln(),
+            },
+        });
+        parameters
+    }
+
+    /// Writes log-parameters into the kernels; returns the last one, which is not a kernel's.
+    fn set(&mut self, log_parameters: &[f64]) -> Result<f64> {
+        let mut rest = log_parameters;
+        for kernel in &mut self.kernels {
+            let (own, others) = rest.split_at(kernel.n_parameters());
+            kernel.set_log_parameters(own)?;
+            rest = others;
+        }
+        Ok(rest[0])
+    }
+
+    fn search(
+        &mut self,
+        parameters: &[Parameter],
+        data: &LatticeData,
+        options: &OptimizeOptions,
+        evaluation: &dyn Fn() -> Result<()>,
+    ) -> Result<Optimum> {
+        maximize(parameters, data.targets.len(), options, |p| {
+            evaluation()?;
+            let last = self.set(p)?.exp();
+            let (likelihood, slope) = match self.noise {
+                Noise::Optimized => {
+                    let (_, l) = data.profile_likelihood(&self.kernels, last)?;
+                    let slope = l.d_noise;
+                    (l, slope)
+                }
+                Noise::Fixed(noise_variance) => {
+                    let kernels = self.kernels.clone();
+                    let l =
+                        data.likelihood(&LatticeHyper { signal_variance: last, noise_variance, kernels })?;
+                    let slope = l.d_signal;
+                    (l, slope)
+                }
+            };
+            let mut gradient: Vec<f64> = likelihood.d_axes.into_iter().flatten().collect();
+            gradient.push(slope);
+            Ok((likelihood.value, gradient))
+        })
+    }
+
+    /// The hyper-parameters at a result.
+    fn hyper(&mut self, data: &LatticeData, log_parameters: &[f64]) -> Result<LatticeHyper> {
+        let last = self.set(log_parameters)?.exp();
+        let (signal_variance, noise_variance) = match self.noise {
+            Noise::Optimized => {
+                let (signal_variance, _) = data.profile_likelihood(&self.kernels, last)?;
+                (signal_variance, last * signal_variance)
+            }
+            Noise::Fixed(noise) => (last, noise),
+        };
+        Ok(LatticeHyper { signal_variance, noise_variance, kernels: self.kernels.clone() })
+    }
+}

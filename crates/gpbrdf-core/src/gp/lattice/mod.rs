@@ -1,0 +1,294 @@
+//! The exact Gaussian process on a product lattice.
+//!
+//! A product kernel `s^2 k_u k_v k_phi` on `A x B x C` nodes has the covariance
+//! `s^2 K_u (x) K_v (x) K_phi`. With `K_x = Q_x diag(lambda_x) Q_x^T` and `rho = noise / s^2`, everything that
+//! the dense process needs a factorisation of an `n x n` matrix for (`n = A B C`) becomes contractions with
+//! three small matrices, `O(n (A + B + C))` each; see Y. Saatci, "Scalable Inference for Structured Gaussian
+//! Process Models" (2011), chapter 5.
+
+mod data;
+pub(crate) mod fit;
+pub(crate) mod kronecker;
+mod likelihood;
+pub(crate) mod posterior;
+mod separable;
+pub(crate) mod table;
+
+pub use data::LatticeData;
+pub use likelihood::LatticeLikelihood;
+pub use separable::{AxisBasis, SeparableForm};
+
+use std::sync::OnceLock;
+
+use faer::{Mat, MatRef, Par};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use self::data::AxisEigen;
+use self::kronecker::apply;
+use crate::base::error::{Error, Result};
+use crate::kernel::Kernel1d;
+
+/// Hyper-parameters of a lattice process.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LatticeHyper {
+    /// `s^2`, in squared target units.
+    pub signal_variance: f64,
+    /// Noise variance, in squared target units.
+    pub noise_variance: f64,
+    /// The kernel of each axis.
+    pub kernels: [Kernel1d; 3],
+}
+
+/// A lattice process conditioned on its targets.
+#[derive(Clone, Debug)]
+pub struct LatticeGp {
+    data: LatticeData,
+    hyper: LatticeHyper,
+    /// `(K + rho I)^-1 y`, laid out like the targets.
+    weights: Vec<f64>,
+    /// What variances need; a process that was loaded makes it when it is first asked for one.
+    spectrum: OnceLock<Spectrum>,
+}
+
+/// The covariance in its eigenbasis.
+#[derive(Clone, Debug)]
+pub(crate) struct Spectrum {
+    /// Of each axis.
+    pub(crate) eigen: [AxisEigen; 3],
+    /// `1 / (lambda_u lambda_v lambda_phi + rho)`, laid out like one channel.
+    pub(crate) precision: Vec<f64>,
+}
+
+/// [`Spectrum::precision`].
+fn precision(eigen: &[AxisEigen; 3], ratio: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(eigen.iter().map(|e| e.values.len()).product());
+    for &u in &eigen[0].values {
+        for &v in &eigen[1].values {
+            out.extend(eigen[2].values.iter().map(|&phi| 1.0 / (u * v * phi + ratio)));
+        }
+    }
+    out
+}
+
+impl Spectrum {
+    fn new(data: &LatticeData, hyper: &LatticeHyper) -> Result<Self> {
+        let (eigen, _) = data.eigen(&hyper.kernels, false)?;
+        let precision = precision(&eigen, hyper.noise_variance / hyper.signal_variance);
+        Ok(Self { eigen, precision })
+    }
+}
+
+impl LatticeGp {
+    /// Conditions the process on `data` (paper eqs. 12 and 13). `O(n (A + B + C))` time a channel.
+    ///
+    /// # Errors
+    /// Data of the wrong size or not finite, hyper-parameters out of range.
+    pub fn new(data: LatticeData, hyper: LatticeHyper) -> Result<Self> {
+        data.validate()?;
+        hyper.validate()?;
+        let spectrum = Spectrum::new(&data, &hyper)?;
+        let vectors = spectrum.eigen.each_ref().map(|e| e.vectors.as_ref());
+        let mut z = apply(vectors.map(MatRef::transpose), &data.targets, data.channels);
+        for tensor in z.chunks_mut(spectrum.precision.len()) {
+            tensor.iter_mut().zip(&spectrum.precision).for_each(|(z, d)| *z *= d);
+        }
+        let weights = apply(vectors, &z, data.channels);
+        Ok(Self { data, hyper, weights, spectrum: OnceLock::from(spectrum) })
+    }
+
+    /// A process whose weights are known already, from a file: predictions of the mean use them as they are, and nothing
+    /// is factorised before the first variance.
+    ///
+    /// # Errors
+    /// As [`LatticeGp::new`], and weights of the wrong number.
+    pub(crate) fn from_weights(data: LatticeData, hyper: LatticeHyper, weights: Vec<f64>) -> Result<Self> {
+        data.validate()?;
+        hyper.validate()?;
+        if weights.len() != data.targets.len() {
+            return Err(Error::argument("lattice weights", data.targets.len().to_string(), weights.len()));
+        }
+        Ok(Self { data, hyper, weights, spectrum: OnceLock::new() })
+    }
+
+    /// What variances need, made when it is first needed. `O(A^3 + B^3 + C^3)`.
+    pub(crate) fn spectrum(&self) -> Result<&Spectrum> {
+        if let Some(spectrum) = self.spectrum.get() {
+            return Ok(spectrum);
+        }
+        let made = Spectrum::new(&self.data, &self.hyper)?;
+        Ok(self.spectrum.get_or_init(|| made))
+    }
+
+    /// Coordinates and targets.
+    #[must_use]
+    pub fn data(&self) -> &LatticeData {
+        &self.data
+    }
+
+    /// Hyper-parameters.
+    #[must_use]
+    pub fn hyper(&self) -> &LatticeHyper {
+        &self.hyper
+    }
+
+    /// `(K + rho I)^-1 y`, laid out like the targets: the predictive mean is `k(x, X) . weights`.
+    #[must_use]
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Kernel values between `points` (coordinates along axis `k`) and the nodes: `points x nodes`, stored
+    /// column by column.
+    #[must_use]
+    pub(crate) fn cross(&self, k: usize, points: &[f64]) -> Mat<f64> {
+        let mut out = Mat::zeros(points.len(), self.data.coordinates[k].len());
+        let (kernel, metric) = (&self.hyper.kernels[k], self.data.metrics[k]);
+        let (mut sums, mut values) = (vec![0.0; points.len()], vec![0.0; points.len()]);
+        for (column, &node) in out.col_iter_mut().zip(&self.data.coordinates[k]) {
+            sums.fill(0.0);
+            for other in std::iter::once(node).chain(self.data.image(k, node)) {
+                values.iter_mut().zip(points).for_each(|(d, &x)| *d = metric.distance(x, other).powi(2));
+                kernel.fill(&mut values);
+                sums.iter_mut().zip(&values).for_each(|(sum, value)| *sum += value);
+            }
+            column.iter_mut().zip(&sums).for_each(|(out, sum)| *out = *sum);
+        }
+        out
+    }
+
+    /// Predictive mean (paper eq. 12) at points given by their three kernel coordinates:
+    /// `[point][channel]`. `O(n)` a point, in parallel.
+    #[must_use]
+    pub fn predict_mean(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let channels = self.data.channels;
+        let [a, b, c] = self.data.shape();
+        points
+            .par_chunks(64)
+            .flat_map_iter(|points| {
+                let [ku, kv, kp] = self.cross_rows(points);
+                // All points and channels: contract u by one product.
+                let mut out = Vec::with_capacity(points.len() * channels);
+                let mut contracted = Mat::zeros(b * c, points.len());
+                let mut sums = vec![0.0; points.len() * channels];
+                for (ch, weights) in self.weights.chunks(a * b * c).enumerate() {
+                    let weights = MatRef::from_column_major_slice(weights, b * c, a);
+                    faer::linalg::matmul::matmul(
+                        contracted.as_mut(),
+                        faer::Accum::Replace,
+                        weights,
+                        ku.transpose(),
+                        1.0,
+                        Par::Seq,
+                    );
+                    for p in 0..points.len() {
+                        let mut sum = 0.0;
+                        for j in 0..b {
+                            let mut row = 0.0;
+                            for k in 0..c {
+                                row += contracted[(j * c + k, p)] * kp[(p, k)];
+                            }
+                            sum += row * kv[(p, j)];
+                        }
+                        sums[p * channels + ch] = sum;
+                    }
+                }
+                out.append(&mut sums);
+                out
+            })
+            .collect()
+    }
+
+    /// Latent predictive variance (paper eq. 13) at points given by their three kernel coordinates, the same for
+    /// every channel: `s^2 (k(x, x) - sum D (k Q)^2)`. `O(n)` a point, in parallel. Add the noise variance for
+    /// that of a new observation.
+    ///
+    /// # Errors
+    /// Covariances of an axis that have no eigendecomposition.
+    pub fn predict_variance_latent(&self, points: &[[f64; 3]]) -> Result<Vec<f64>> {
+        let [a, b, c] = self.data.shape();
+        let spectrum = self.spectrum()?;
+        let variances = points.par_chunks(64).flat_map_iter(|points| {
+            let crosses = self.cross_rows(points);
+            let [mut su, mut sv, mut sp]: [Mat<f64>; 3] =
+                std::array::from_fn(|k| &crosses[k] * &spectrum.eigen[k].vectors);
+            for m in [&mut su, &mut sv, &mut sp] {
+                square(m);
+            }
+            let precision = MatRef::from_column_major_slice(&spectrum.precision, b * c, a);
+            let contracted = precision * su.transpose();
+            (0..points.len())
+                .map(|p| {
+                    let mut explained = 0.0;
+                    for j in 0..b {
+                        let row: f64 = (0..c).map(|k| contracted[(j * c + k, p)] * sp[(p, k)]).sum();
+                        explained += row * sv[(p, j)];
+                    }
+                    (self.hyper.signal_variance * (self.prior_variance(points[p]) - explained)).max(0.0)
+                })
+                .collect::<Vec<_>>()
+        });
+        Ok(variances.collect())
+    }
+
+    /// `k(x, x)` without the signal variance, at kernel coordinates `x`.
+    #[must_use]
+    pub(crate) fn prior_variance(&self, x: [f64; 3]) -> f64 {
+        (0..3).map(|k| self.axis_variance(k, x[k])).product()
+    }
+
+    /// `k(x, x)` of axis `k` at its coordinate `x`.
+    pub(crate) fn axis_variance(&self, k: usize, x: f64) -> f64 {
+        self.data.axis_variance(k, &self.hyper.kernels[k], x)
+    }
+
+    fn cross_rows(&self, points: &[[f64; 3]]) -> [Mat<f64>; 3] {
+        std::array::from_fn(|k| self.cross(k, &points.iter().map(|p| p[k]).collect::<Vec<_>>()))
+    }
+
+    /// Leave-one-out residuals `y_i - mean_-i(x_i)`, laid out like the targets
+    /// (Rasmussen and Williams 2006, eq. 5.12): `w_i / [(K + rho I)^-1]_ii`. `O(n (A + B + C))`.
+    ///
+    /// # Errors
+    /// Those of [`LatticeGp::predict_variance_latent`].
+    pub fn leave_one_out_residuals(&self) -> Result<Vec<f64>> {
+        let Spectrum { eigen, precision } = self.spectrum()?;
+        let squares = eigen.each_ref().map(|e| {
+            let mut m = e.vectors.clone();
+            square(&mut m);
+            m
+        });
+        let diagonal = apply(squares.each_ref().map(Mat::as_ref), precision, 1);
+        let per_channel = self.weights.chunks(diagonal.len());
+        Ok(per_channel.flat_map(|w| w.iter().zip(&diagonal).map(|(w, d)| w / d)).collect())
+    }
+}
+
+/// Squares every entry.
+pub(crate) fn square(m: &mut Mat<f64>) {
+    for column in m.col_iter_mut() {
+        for x in column.iter_mut() {
+            *x *= *x;
+        }
+    }
+}
+
+impl LatticeHyper {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// A variance that is not positive and finite, or a broken kernel.
+    pub fn validate(&self) -> Result<()> {
+        for (what, value) in
+            [("signal variance", self.signal_variance), ("noise variance", self.noise_variance)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::argument(what, "a positive number", value));
+            }
+        }
+        self.kernels.iter().try_for_each(Kernel1d::validate)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,152 @@
+//! Kernel coordinates of a table's cells.
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::brdf::angles::theta_d_max;
+use crate::brdf::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
+use crate::sample::space::{InputSpace, WarpedBox};
+use crate::sample::symmetry::Symmetry;
+
+/// The kernel coordinates of every cell's centre, as the factors of which they are products.
+///
+/// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` stands at `first[i]`, `min(second[l] scale(i, p), limit)` and
+/// `third[row(p)]`. In the warped box all cells of a column `(i, p)` that are below the horizon are alike, and where
+/// `phi_d` is folded both halves of it: 0.56 M distinct points in place of 1.46 M.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableGeometry {
+    first: Vec<f64>,
+    second: Vec<f64>,
+    third: Vec<f64>,
+    /// `[i_theta_h][column]`.
+    scale: Vec<f64>,
+    /// Cells of each column whose coordinates differ, laid out like `scale`.
+    distinct: Vec<usize>,
+    limit: f64,
+}
+
+/// Distinct `|cos phi_d|` of the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
+const COLUMNS: usize = N_PHI_D / 2;
+
+impl TableGeometry {
+    /// The geometry of a process in `space`.
+    #[must_use]
+    pub fn new(space: InputSpace) -> Self {
+        let theta_d = (0..N_THETA_D).map(|l| (l as f64 + 0.5) / N_THETA_D as f64 * FRAC_PI_2);
+        let (second, scale, rows): (Vec<f64>, Vec<f64>, usize) = match space {
+            InputSpace::WarpedBox(WarpedBox { v_density, symmetry, .. }) => {
+                // v^(1/density) = theta_d^(1/density) theta_d_max^(-1/density).
+                let exponent = v_density.recip();
+                let limits = (0..N_THETA_H * COLUMNS).map(|k| {
+                    let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
+                    theta_d_max(center.theta_h, center.phi_d).powf(-exponent)
+                });
+                let rows = if symmetry == Symmetry::Bilateral { COLUMNS } else { N_PHI_D };
+                (theta_d.map(|t| t.powf(exponent)).collect(), limits.collect(), rows)
+            }
+            InputSpace::HalfDiff => (theta_d.collect(), vec![1.0; N_THETA_H * COLUMNS], N_PHI_D),
+        };
+        let limit = if space.stops_at_horizon() { 1.0 } else { f64::INFINITY };
+        let above = |scale: &f64| second.iter().take_while(|x| **x * scale < limit).count();
+        let distinct = scale.iter().map(|scale| (above(scale) + 1).min(N_THETA_D)).collect();
+        let (first, third) = match space {
+            InputSpace::WarpedBox(warped) => {
+                let u = (0..N_THETA_H).map(|i| warped.warp_u((i as f64 + 0.5) / N_THETA_H as f64));
+                let phi = (0..rows).map(|p| warped.warp_phi(cell_center(0, 0, p).phi_d));
+                (u.collect(), phi.collect())
+            }
+            InputSpace::HalfDiff => (
+                (0..N_THETA_H).map(|i| cell_center(i, 0, 0).theta_h).collect(),
+                (0..rows).map(|p| cell_center(0, 0, p).phi_d).collect(),
+            ),
+        };
+        Self { first, second, third, scale, distinct, limit }
+    }
+
+    /// First coordinate by `i_theta_h`.
+    #[must_use]
+    pub fn first(&self) -> &[f64] {
+        &self.first
+    }
+
+    /// What depends on `i_theta_d` in the second coordinate.
+    #[must_use]
+    pub fn second(&self) -> &[f64] {
+        &self.second
+    }
+
+    /// Third coordinate by row: 90 rows where `phi_d` is folded, else 180.
+    #[must_use]
+    pub fn third(&self) -> &[f64] {
+        &self.third
+    }
+
+    /// What depends on `(i_theta_h, column)` in the second coordinate: `[i_theta_h][90]`, with the columns of `phi_d`
+    /// and of `pi - phi_d` the same one.
+    #[must_use]
+    pub fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    /// How many of the cells of `(i_theta_h, column)` have coordinates of their own; the cells above share those of
+    /// the last. Laid out like [`TableGeometry::scale`].
+    #[must_use]
+    pub fn distinct(&self) -> &[usize] {
+        &self.distinct
+    }
+
+    /// The largest value of the second coordinate: the horizon, at 1, in the warped box.
+    #[must_use]
+    pub fn limit(&self) -> f64 {
+        self.limit
+    }
+
+    /// Second coordinates of the distinct cells of one column.
+    pub(crate) fn column(&self, i_theta_h: usize, column: usize) -> impl Iterator<Item = f64> {
+        let k = i_theta_h * COLUMNS + column;
+        self.second[..self.distinct[k]].iter().map(move |x| (x * self.scale[k]).min(self.limit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::table::{N_CELLS, cell_indices};
+
+    #[test]
+    fn cells_stand_where_the_space_says() {
+        for space in [
+            InputSpace::WarpedBox(WarpedBox {
+                density: 1.3,
+                v_density: 0.65,
+                symmetry: Symmetry::Bilateral,
+                tail: 1.7,
+                phi_density: 1.4,
+            }),
+            InputSpace::WarpedBox(WarpedBox {
+                density: 1.0,
+                v_density: 1.0,
+                symmetry: Symmetry::Reciprocal,
+                tail: 1.0,
+                phi_density: 1.4,
+            }),
+            InputSpace::HalfDiff,
+        ] {
+            let geometry = TableGeometry::new(space);
+            let rows = geometry.third().len();
+            for cell in (0..N_CELLS).step_by(43) {
+                let (i, l, p) = cell_indices(cell);
+                let expected = space.coordinates(cell_center(i, l, p));
+                let (column, row) =
+                    (p.min(N_PHI_D - 1 - p), if rows == COLUMNS { p.min(N_PHI_D - 1 - p) } else { p });
+                let along: Vec<f64> = geometry.column(i, column).collect();
+                let found = [geometry.first()[i], along[l.min(along.len() - 1)], geometry.third()[row]];
+                for k in 0..3 {
+                    assert!(
+                        (found[k] - expected[k]).abs() < 1e-13,
+                        "{space:?} {cell} {found:?} {expected:?}"
+                    );
+                }
+            }
+        }
+    }
+}

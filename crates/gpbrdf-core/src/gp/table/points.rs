@@ -1,0 +1,110 @@
+//! Predictive mean and sigma of any posterior on the whole table, direction by direction.
+
+use rayon::prelude::*;
+
+use crate::base::error::Result;
+use crate::brdf::angles::HalfDiff;
+use crate::brdf::table::{
+    N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, cell_center, cell_index, cell_indices, mirrored_column,
+};
+use crate::gp::posterior::Posterior;
+use crate::gp::table::{MeanTable, to_f32};
+
+/// Sigma is computed at every `STEP`-th cell along each axis and interpolated between: it costs `n^2` a point and
+/// varies slowly.
+const STEP: usize = 3;
+
+/// Writes the predictive mean of every cell. In the warped box all cells of a column that are below the horizon are
+/// alike, and so are both halves of `phi_d` in a bilateral one: 0.56 M predictions instead of 1.46 M.
+pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanTable<'_>) {
+    let space = posterior.space();
+    let columns = if space.is_bilateral() { N_PHI_D / 2 } else { N_PHI_D };
+    let channels = posterior.n_channels();
+    // One slab at a time, so that the points stay few.
+    for (i, slab) in table.cells.chunks_mut(SLAB).enumerate() {
+        let mut angles: Vec<HalfDiff> = Vec::with_capacity(SLAB);
+        // For each column, where its predictions start.
+        let mut starts = Vec::with_capacity(columns + 1);
+        for p in 0..columns {
+            starts.push(angles.len());
+            for d in 0..N_THETA_D {
+                let center = cell_center(i, d, p);
+                angles.push(center);
+                if space.stops_at_horizon() && !center.is_above_horizon() {
+                    break;
+                }
+            }
+        }
+        starts.push(angles.len());
+        let means = posterior.predict_mean(&angles);
+        for p in 0..N_PHI_D {
+            let column = if columns == N_PHI_D { p } else { mirrored_column(p) };
+            let means = &means[starts[column] * channels..starts[column + 1] * channels];
+            let cells = means.len() / channels;
+            for d in 0..N_THETA_D {
+                let at = d.min(cells - 1) * channels;
+                let cell = &mut slab[cell_index(0, d, p)];
+                for (channel, mean) in (table.first_channel..).zip(&means[at..at + channels]) {
+                    cell[channel] = to_f32(table.transform.inverse(table.offsets[channel] + mean));
+                }
+            }
+        }
+    }
+}
+
+/// Latent standard deviation of every cell, by trilinear interpolation between the middles of blocks of
+/// `STEP^3` cells: `30 x 30 x 60` points, or half as many in a bilateral space. One plane for each variance.
+pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Vec<f32>>> {
+    let bilateral = posterior.space().is_bilateral();
+    let shape = [N_THETA_H / STEP, N_THETA_D / STEP, N_PHI_D / STEP / if bilateral { 2 } else { 1 }];
+    let middle = |knot: usize| knot * STEP + STEP / 2;
+    let knots: Vec<HalfDiff> = (0..shape.iter().product())
+        .map(|i| {
+            let (h, d, p) = (i / (shape[1] * shape[2]), i / shape[2] % shape[1], i % shape[2]);
+            cell_center(middle(h), middle(d), middle(p))
+        })
+        .collect();
+    let variances = posterior.predict_variance(&knots)?;
+    let count = posterior.n_variances();
+    let planes = (0..count).map(|variance| {
+        let sigma: Vec<f64> = variances.iter().skip(variance).step_by(count).map(|v| v.sqrt()).collect();
+        (0..N_CELLS)
+            .into_par_iter()
+            .map(|cell| {
+                let (h, d, mut p) = cell_indices(cell);
+                if bilateral {
+                    p = mirrored_column(p);
+                }
+                let axes = [between(h, shape[0]), between(d, shape[1]), between(p, shape[2])];
+                let mut sum = 0.0;
+                for corner in 0..8usize {
+                    let pick = |k: usize| {
+                        let (low, weight) = axes[k];
+                        if corner >> k & 1 == 0 {
+                            (low, 1.0 - weight)
+                        } else {
+                            ((low + 1).min(shape[k] - 1), weight)
+                        }
+                    };
+                    let ((h, a), (d, b), (p, c)) = (pick(0), pick(1), pick(2));
+                    sum += a * b * c * sigma[(h * shape[1] + d) * shape[2] + p];
+                }
+                to_f32(sum)
+            })
+            .collect()
+    });
+    Ok(planes.collect())
+}
+
+/// The knot below a cell and the weight of the one above; the ends are held.
+fn between(cell: usize, knots: usize) -> (usize, f64) {
+    let x = (cell as f64 - (STEP / 2) as f64) / STEP as f64;
+    let x = x.clamp(0.0, (knots - 1) as f64);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "x lies within [0, knots - 1]"
+    )]
+    let low = x as usize;
+    (low, x - low as f64)
+}

@@ -1,0 +1,344 @@
+//! Light from all around: latitude-longitude maps in linear RGB.
+//!
+//! Convention: right-handed, `+y` up. A pixel at `u` (left to right) and `v` (top to bottom), both in `[0, 1]`,
+//! stands for the direction `(sin t sin p, cos t, -sin t cos p)` with `t = pi v` and `p = 2 pi (u - 1/2)`: the
+//! middle of the map looks along `-z`, its right quarter along `+x`, its edges along `+z`.
+
+use std::f64::consts::{PI, TAU};
+use std::io::Cursor;
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use crate::base::error::{Error, Result};
+use crate::brdf::Rgb;
+
+/// The most pixels that [`Environment::read`] takes: 3.2 GB.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// A latitude-longitude map of radiance, linear RGB, rows from top to bottom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Environment {
+    width: usize,
+    height: usize,
+    pixels: Vec<[f32; 3]>,
+}
+
+/// One patch of an [`Environment`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvDirection {
+    /// Unit direction towards the middle of the patch.
+    pub direction: Vector3<f64>,
+    /// Mean radiance over the patch.
+    pub radiance: Rgb,
+    /// Solid angle of the patch, sr.
+    pub solid_angle: f64,
+}
+
+/// A soft light of [`Environment::studio`]: `peak exp(sharpness (d . axis - 1))`, a von Mises-Fisher lobe.
+struct SoftLight {
+    axis: [f64; 3],
+    sharpness: f64,
+    peak: Rgb,
+}
+
+/// Key, fill and rim light. Half of the peak is left at `acos(1 - ln 2 / sharpness)`: 9, 28 and 13 degrees.
+const STUDIO_LIGHTS: [SoftLight; 3] = [
+    SoftLight { axis: [-0.55, 0.65, 0.60], sharpness: 60.0, peak: [50.0, 44.0, 36.0] },
+    SoftLight { axis: [0.85, 0.10, 0.45], sharpness: 6.0, peak: [1.2, 1.6, 2.4] },
+    SoftLight { axis: [0.60, 0.45, -0.65], sharpness: 28.0, peak: [6.0, 8.0, 11.0] },
+];
+const STUDIO_ZENITH: Rgb = [0.12, 0.16, 0.26];
+const STUDIO_HORIZON: Rgb = [0.42, 0.42, 0.44];
+const STUDIO_FLOOR: Rgb = [0.050, 0.042, 0.036];
+
+impl Environment {
+    /// A map of `width * height` pixels, rows from top to bottom.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] when a side is 0, the number of pixels is not `width * height`, or a value is
+    /// negative or not finite.
+    pub fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self> {
+        if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
+            let expected = format!("{width} x {height} pixels, at least one");
+            return Err(Error::argument("environment", expected, pixels.len()));
+        }
+        if let Some(at) = pixels.iter().position(|p| p.iter().any(|&x| !(x >= 0.0 && x.is_finite()))) {
+            let found = format!("{:?} at column {} of row {}", pixels[at], at % width, at / width);
+            return Err(Error::argument("environment", "finite radiance, not negative", found));
+        }
+        Ok(Self { width, height, pixels })
+    }
+
+    /// The environment of the image metrics: a studio made by formula, 192 x 96 pixels.
+    ///
+    /// With `d` the direction and `s = smoothstep(-0.08, 0.08, d.y)`, the radiance is
+    /// `(1 - s) floor + s (horizon + (zenith - horizon) sqrt(max(d.y, 0)))` plus three soft lights
+    /// `peak exp(sharpness (d . axis - 1))`: a warm key light above to the left of the viewer, who looks along
+    /// `-z` (peak 50), a broad cool fill light from the right, and a cool rim light from behind.
+    #[must_use]
+    pub fn studio() -> Self {
+        let (width, height) = (192, 96);
+        let pixels = (0..width * height)
+            .map(|i| {
+                let u = ((i % width) as f64 + 0.5) / width as f64;
+                let v = ((i / width) as f64 + 0.5) / height as f64;
+                narrow(studio_radiance(&lat_long(u, v)))
+            })
+            .collect();
+        Self { width, height, pixels }
+    }
+
+    /// Reads a Radiance `.hdr` or an `OpenEXR` file (first layer with R, G and B), told apart by content.
+    /// Negative values become 0.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be read, [`Error::UnknownFormat`] when it is of neither kind,
+    /// [`Error::Format`] when it is broken, over 2^28 pixels, or holds a value that is not finite.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
+        let (format, decoded) = if bytes.starts_with(b"#?") {
+            ("Radiance HDR", decode_hdr(&bytes))
+        } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+            ("OpenEXR", decode_exr(&bytes))
+        } else {
+            let shown: String = bytes.iter().take(4).map(|b| format!("{b:02x} ")).collect();
+            return Err(Error::UnknownFormat {
+                path: path.to_owned(),
+                expected: "a Radiance HDR or OpenEXR environment map",
+                found: format!("{} bytes starting with [{}]", bytes.len(), shown.trim_end()),
+            });
+        };
+        let broken = |expected: &str, found: String| Error::Format {
+            format,
+            path: path.to_owned(),
+            expected: expected.to_owned(),
+            found,
+        };
+        let (width, height, mut pixels) =
+            decoded.map_err(|found| broken("a latitude-longitude map in RGB", found))?;
+        for value in pixels.iter_mut().flatten() {
+            // Not `max`, which would make 0 of NaN.
+            if *value < 0.0 {
+                *value = 0.0;
+            }
+        }
+        Self::new(width, height, pixels).map_err(|error| broken("finite radiance", error.to_string()))
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Radiance, linear RGB, rows from top to bottom.
+    #[must_use]
+    pub fn pixels(&self) -> &[[f32; 3]] {
+        &self.pixels
+    }
+
+    /// The map as `columns x rows` patches, row by row: each patch's mean radiance, weighted by solid angle,
+    /// with pixels that straddle an edge shared out. The flux `sum radiance solid_angle` stays what it was.
+    #[must_use]
+    pub fn average_to(&self, columns: usize, rows: usize) -> Vec<EnvDirection> {
+        let across: Vec<_> = (0..columns).map(|i| overlaps(i, columns, self.width)).collect();
+        let mut patches = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            let (top, bottom) = (row as f64 / rows as f64, (row + 1) as f64 / rows as f64);
+            let band = (PI * top).cos() - (PI * bottom).cos();
+            let down: Vec<_> = overlaps(row, rows, self.height)
+                .into_iter()
+                .map(|(y, low, high)| (y, (PI * low).cos() - (PI * high).cos()))
+                .collect();
+            for (column, spans) in across.iter().enumerate() {
+                let mut sum = [0.0; 3];
+                let mut total = 0.0;
+                for &(y, weight_y) in &down {
+                    for &(x, low, high) in spans {
+                        let weight = weight_y * (high - low);
+                        total += weight;
+                        let pixel = self.pixels[y * self.width + x];
+                        for c in 0..3 {
+                            sum[c] += weight * f64::from(pixel[c]);
+                        }
+                    }
+                }
+                let u = (column as f64 + 0.5) / columns as f64;
+                patches.push(EnvDirection {
+                    direction: lat_long(u, 0.5 * (top + bottom)),
+                    radiance: sum.map(|x| x / total),
+                    solid_angle: band * TAU / columns as f64,
+                });
+            }
+        }
+        patches
+    }
+}
+
+/// The direction at `(u, v)`; the module states the convention.
+fn lat_long(u: f64, v: f64) -> Vector3<f64> {
+    let (sin_t, cos_t) = (PI * v).sin_cos();
+    let (sin_p, cos_p) = (TAU * (u - 0.5)).sin_cos();
+    Vector3::new(sin_t * sin_p, cos_t, -sin_t * cos_p)
+}
+
+/// The formula of [`Environment::studio`].
+fn studio_radiance(d: &Vector3<f64>) -> Rgb {
+    let t = ((d.y + 0.08) / 0.16).clamp(0.0, 1.0);
+    let above = t * t * (3.0 - 2.0 * t);
+    let height = d.y.max(0.0).sqrt();
+    std::array::from_fn(|c| {
+        let sky = STUDIO_HORIZON[c] + (STUDIO_ZENITH[c] - STUDIO_HORIZON[c]) * height;
+        let lights: f64 = STUDIO_LIGHTS
+            .iter()
+            .map(|light| {
+                let cosine = d.dot(&Vector3::from(light.axis).normalize());
+                light.peak[c] * (light.sharpness * (cosine - 1.0)).exp()
+            })
+            .sum();
+        (1.0 - above) * STUDIO_FLOOR[c] + above * sky + lights
+    })
+}
+
+/// The cells of an axis of `source` cells that cell `i` of `target` cells covers, each with the two ends of the
+/// common part, in units of the whole axis.
+fn overlaps(i: usize, target: usize, source: usize) -> Vec<(usize, f64, f64)> {
+    // In integers of 1 / (target source), so that shared edges are exact.
+    let (begin, end) = (i * source, (i + 1) * source);
+    let whole = (target * source) as f64;
+    (begin / target..end.div_ceil(target))
+        .map(|j| {
+            let low = begin.max(j * target);
+            let high = end.min((j + 1) * target);
+            (j, low as f64 / whole, high as f64 / whole)
+        })
+        .collect()
+}
+
+/// Width, height and pixels, or what is wrong.
+type Decoded = Result<(usize, usize, Vec<[f32; 3]>), String>;
+
+fn decode_hdr(bytes: &[u8]) -> Decoded {
+    let image = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Hdr)
+        .decode()
+        .map_err(|error| error.to_string())?
+        .into_rgb32f();
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    Ok((width, height, image.pixels().map(|p| p.0).collect()))
+}
+
+fn decode_exr(bytes: &[u8]) -> Decoded {
+    use exr::prelude::{ReadChannels as _, ReadLayers as _};
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|error| error.to_string())?;
+    for header in &meta.headers {
+        if header.layer_size.area() > MAX_PIXELS {
+            return Err(format!("{} x {} pixels", header.layer_size.width(), header.layer_size.height()));
+        }
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0f32; 3]; size.area()]),
+            |(width, pixels): &mut (usize, Vec<[f32; 3]>), at, (r, g, b): (f32, f32, f32)| {
+                pixels[at.y() * *width + at.x()] = [r, g, b];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| error.to_string())?;
+    let size = image.layer_data.size;
+    Ok((size.width(), size.height(), image.layer_data.channel_data.pixels.1))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of a map")]
+fn narrow(rgb: Rgb) -> [f32; 3] {
+    rgb.map(|x| x as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patches_fill_the_sphere_and_keep_the_flux() {
+        // 50 x 23 pixels divide neither 48 nor 24.
+        let pixels = (0..50 * 23).map(|i| [(i % 7) as f32, (i % 50) as f32, (i / 50) as f32]).collect();
+        let map = Environment::new(50, 23, pixels).unwrap();
+        let patches = map.average_to(48, 24);
+        let whole: f64 = patches.iter().map(|p| p.solid_angle).sum();
+        assert!((whole - 4.0 * PI).abs() < 1e-12);
+        for c in 0..3 {
+            let mut flux = 0.0;
+            for (i, pixel) in map.pixels().iter().enumerate() {
+                let (top, bottom) = ((i / 50) as f64 / 23.0 * PI, (i / 50 + 1) as f64 / 23.0 * PI);
+                flux += f64::from(pixel[c]) * (top.cos() - bottom.cos()) * TAU / 50.0;
+            }
+            let kept: f64 = patches.iter().map(|p| p.radiance[c] * p.solid_angle).sum();
+            assert!((kept / flux - 1.0).abs() < 1e-12, "{kept} {flux}");
+        }
+        assert!(patches.iter().all(|p| (p.direction.norm() - 1.0).abs() < 1e-14));
+        assert!(map.average_to(0, 5).is_empty());
+    }
+
+    #[test]
+    fn the_axes_are_where_the_convention_says() {
+        let gap = |u, v, x, y, z| (lat_long(u, v) - Vector3::new(x, y, z)).norm();
+        assert!(gap(0.5, 0.5, 0.0, 0.0, -1.0) < 1e-15);
+        assert!(gap(0.75, 0.5, 1.0, 0.0, 0.0) < 1e-15);
+        assert!(gap(0.3, 0.0, 0.0, 1.0, 0.0) < 1e-15);
+        assert!(gap(0.0, 0.5, 0.0, 0.0, 1.0) < 1e-15);
+    }
+
+    #[test]
+    fn the_studio_has_its_brightest_light_above_to_the_left_of_the_viewer() {
+        let patches = Environment::studio().average_to(48, 24);
+        let brightest = patches.iter().max_by(|a, b| a.radiance[0].total_cmp(&b.radiance[0])).unwrap();
+        assert!(brightest.radiance[0] > 40.0 && brightest.radiance[0] < 51.0, "{brightest:?}");
+        let axis = Vector3::new(-0.55, 0.65, 0.60).normalize();
+        assert!(brightest.direction.dot(&axis) > 0.99);
+    }
+
+    #[test]
+    fn files_of_both_kinds_are_read_back_and_others_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let pixels = [[1.0f32, 0.5, 0.25], [2.0, 4.0, 8.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.5]];
+        let hdr = folder.path().join("map.dat");
+        let rgb: Vec<_> = pixels.iter().map(|&p| image::Rgb(p)).collect();
+        let file = std::fs::File::create(&hdr).unwrap();
+        image::codecs::hdr::HdrEncoder::new(file).encode(&rgb, 2, 2).unwrap();
+        let map = Environment::read(&hdr).unwrap();
+        assert_eq!((map.width(), map.height()), (2, 2));
+        assert_eq!(map.pixels(), pixels);
+
+        let exr = folder.path().join("map.exr");
+        exr::prelude::write_rgb_file(&exr, 2, 2, |x, y| {
+            let [r, g, b] = pixels[2 * y + x];
+            (r, g, if x == 0 && y == 1 { -1.0 } else { b })
+        })
+        .unwrap();
+        assert_eq!(Environment::read(&exr).unwrap().pixels(), pixels);
+
+        let bytes = std::fs::read(&hdr).unwrap();
+        std::fs::write(&hdr, &bytes[..bytes.len() - 3]).unwrap();
+        assert!(matches!(Environment::read(&hdr), Err(Error::Format { .. })));
+        let bytes = std::fs::read(&exr).unwrap();
+        std::fs::write(&exr, &bytes[..bytes.len() / 2]).unwrap();
+        assert!(matches!(Environment::read(&exr), Err(Error::Format { .. })));
+        exr::prelude::write_rgb_file(&exr, 1, 1, |_, _| (f32::NAN, 0.0, 0.0)).unwrap();
+        assert!(matches!(Environment::read(&exr), Err(Error::Format { .. })));
+        std::fs::write(&hdr, b"P6 1 1").unwrap();
+        let message = Environment::read(&hdr).unwrap_err().to_string();
+        assert!(message.contains("6 bytes starting with [50 36 20 31]"), "{message}");
+        assert!(matches!(Environment::read(folder.path()), Err(Error::Io { .. })));
+    }
+}

@@ -1,0 +1,17 @@
+//! How well a prediction meets a truth: cell by cell, and in pictures of a lit sphere.
+
+mod environment;
+mod image;
+pub(crate) mod image_metrics;
+mod metrics;
+pub(crate) mod sphere;
+mod ssim;
+
+pub use environment::{EnvDirection, Environment};
+pub use image::Image;
+pub use image_metrics::{ImageMetrics, PixelDifference, exposure_of, psnr, ssim};
+pub use metrics::{CellMetrics, Interval, Metrics};
+pub use sphere::{
+    DistantLight, ENV_PATCHES, POINT_LIGHT, SPHERE_SIZE, ShadingFrame, environment_lights, render_env,
+    render_point, render_sphere,
+};

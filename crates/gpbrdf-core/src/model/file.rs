@@ -1,0 +1,134 @@
+//! Models on disk: safetensors with everything that is not a tensor as JSON in its metadata.
+//!
+//! The metadata entry `gpbrdf` holds provenance, transform, prior means and a header for each posterior, which names its
+//! solver; its numbers read back to the same bits. The tensors of posterior `g` have names that begin with `g.`. Those of
+//! a lattice process are `u`, `v`, `phi` (kernel coordinates of the nodes), `targets` and `weights`
+//! (`channels x A x B x C`); of a dense one `x` (`n x 3`), `targets` and `weights` (`n x channels`); of an inducing one
+//! `k.values` (`A x B x C`, f16) for each component `k`, from which nodes and weights follow. All but those are f64.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use safetensors::tensor::SafeTensors;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::base::atomic_file::AtomicFile;
+use crate::base::error::{Error, Result};
+use crate::gp::solver;
+use crate::gp::tensors::{TensorReader, TensorWriter};
+use crate::model::Model;
+use crate::sample::{MeanFunction, Provenance, Transform};
+
+/// The version of the format that is written, and the only one that is read.
+const VERSION: u32 = 2;
+
+/// Everything of a model that is not a tensor.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    version: u32,
+    written_by: String,
+    provenance: Provenance,
+    transform: Transform,
+    mean: MeanFunction,
+    offsets: [f64; 3],
+    posteriors: Vec<PosteriorHeader>,
+}
+
+/// What one posterior has saved besides its tensors.
+#[derive(Serialize, Deserialize)]
+struct PosteriorHeader {
+    solver: String,
+    process: Value,
+}
+
+#[derive(Deserialize)]
+struct VersionOnly {
+    version: u32,
+}
+
+impl Model {
+    /// Writes a model file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be written; nothing is left then.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        AtomicFile::write(path.as_ref(), &self.to_bytes()?)
+    }
+
+    /// The bytes of a model file.
+    ///
+    /// # Errors
+    /// Numbers that JSON cannot hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let mut tensors = TensorWriter::default();
+        let mut posteriors = Vec::new();
+        for (g, (_, posterior)) in self.posteriors().enumerate() {
+            tensors.begin(g);
+            let process = posterior.save(&mut tensors)?;
+            posteriors.push(PosteriorHeader { solver: posterior.solver().to_owned(), process });
+        }
+        let header = Header {
+            version: VERSION,
+            written_by: concat!("gpbrdf ", env!("CARGO_PKG_VERSION")).into(),
+            provenance: self.provenance.clone(),
+            transform: self.transform,
+            mean: self.mean,
+            offsets: self.offsets,
+            posteriors,
+        };
+        let unwritable = |what: &dyn std::fmt::Display| Error::argument("model", "finite numbers", what);
+        let json = serde_json::to_string(&header).map_err(|e| unwritable(&e))?;
+        let views = tensors.views().map_err(|e| unwritable(&e))?;
+        safetensors::serialize(views, Some(HashMap::from([("gpbrdf".to_owned(), json)])))
+            .map_err(|e| unwritable(&e))
+    }
+
+    /// Reads a model file. Predictions of the result equal those of the model that was written, bit for bit. Nothing is
+    /// factorised: what only variances need is made when the first one is predicted.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is not a model of this version, or is damaged.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
+        Self::from_bytes(&bytes, path)
+    }
+
+    /// Reads a model from the bytes of a file; `path` is for messages.
+    ///
+    /// # Errors
+    /// Bytes that are not a model of this version, or are damaged.
+    pub fn from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let wrong = |expected: &str, found: String| Error::Format {
+            format: "model",
+            path: path.to_owned(),
+            expected: expected.to_owned(),
+            found,
+        };
+        let parsed = |e: safetensors::SafeTensorError| wrong("a safetensors file", e.to_string());
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(parsed)?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(parsed)?;
+        let json = metadata
+            .metadata()
+            .as_ref()
+            .and_then(|m| m.get("gpbrdf"))
+            .ok_or_else(|| wrong("the metadata entry \"gpbrdf\"", "none".into()))?;
+        let version: VersionOnly =
+            serde_json::from_str(json).map_err(|e| wrong("a version number", e.to_string()))?;
+        if version.version != VERSION {
+            return Err(wrong(&format!("version {VERSION}"), format!("version {}", version.version)));
+        }
+        let header: Header =
+            serde_json::from_str(json).map_err(|e| wrong("metadata of a model", e.to_string()))?;
+        header.transform.validate().map_err(|e| wrong("a consistent model", e.to_string()))?;
+        let posteriors = header.posteriors.into_iter().enumerate().map(|(posterior, header)| {
+            let tensors = TensorReader { tensors: &tensors, posterior, path };
+            solver::load(&header.solver, header.process, &tensors)
+        });
+        let posteriors = posteriors.collect::<Result<Vec<_>>>()?;
+        Self::new(header.provenance, header.transform, header.mean, header.offsets, posteriors)
+            .map_err(|e| wrong("a consistent model", e.to_string()))
+    }
+}

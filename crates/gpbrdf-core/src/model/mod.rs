@@ -1,0 +1,228 @@
+//! A fitted Gaussian-process BRDF: fitting, predicting, saving, baking.
+
+pub(crate) mod bake;
+pub(crate) mod compress;
+pub(crate) mod file;
+pub(crate) mod fit;
+mod interval;
+
+pub use bake::{Baked, bake_mean, bake_sigma};
+pub use compress::{CellWeights, CompressOptions, InducingSize, compress};
+pub use fit::{Conditioned, Fit, FitOptions, condition, fit};
+pub use interval::{IntervalOf, Intervals};
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+
+use crate::base::error::{Error, Result};
+use crate::brdf::angles::HalfDiff;
+use crate::brdf::{Brdf, Rgb};
+use crate::gp::{Hyper, Posterior};
+use crate::model::interval::interval_about;
+use crate::sample::{InputSpace, MeanFunction, Provenance, Transform};
+
+/// A fitted Gaussian-process BRDF: `f = g^-1(m + GP(wi, wo))` for each channel.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// From BRDF values to targets.
+    pub transform: Transform,
+    /// The rule for the prior mean.
+    pub mean: MeanFunction,
+    /// Prior mean of each channel's target.
+    pub offsets: [f64; 3],
+    /// Conditioned processes, of three channels together.
+    posteriors: Vec<Arc<dyn Posterior>>,
+}
+
+/// A prediction for one pair of directions, sr^-1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prediction {
+    /// The predictive mean of the target, carried back: the median of the BRDF value.
+    pub mean: Rgb,
+    /// Lower end of the 95 % interval.
+    pub lower: Rgb,
+    /// Upper end of the 95 % interval.
+    pub upper: Rgb,
+}
+
+impl Model {
+    /// A model of conditioned processes: one for all channels where they share hyper-parameters, else one per channel.
+    ///
+    /// # Errors
+    /// Channels that do not add up to three.
+    pub fn new(
+        provenance: Provenance,
+        transform: Transform,
+        mean: MeanFunction,
+        offsets: [f64; 3],
+        posteriors: Vec<Arc<dyn Posterior>>,
+    ) -> Result<Self> {
+        let channels: usize = posteriors.iter().map(|p| p.n_channels()).sum();
+        if channels != 3 {
+            return Err(Error::argument("channels of a model", "3", channels));
+        }
+        Ok(Self { provenance, transform, mean, offsets, posteriors })
+    }
+
+    /// The conditioned processes, each with its first channel.
+    pub fn posteriors(&self) -> impl Iterator<Item = (usize, &dyn Posterior)> + '_ {
+        self.posteriors.iter().scan(0, |next, posterior| {
+            let first = *next;
+            *next += posterior.n_channels();
+            Some((first, posterior.as_ref()))
+        })
+    }
+
+    /// The first process: it tells the solver of all.
+    fn first(&self) -> &dyn Posterior {
+        self.posteriors[0].as_ref()
+    }
+
+    /// Name of the solver, as in reports and files.
+    #[must_use]
+    pub fn solver(&self) -> &'static str {
+        self.first().solver()
+    }
+
+    /// Name of the solver for people.
+    #[must_use]
+    pub fn solver_label(&self) -> &'static str {
+        self.first().label()
+    }
+
+    /// From directions to the coordinates that kernels compare, of the first process.
+    #[must_use]
+    pub fn space(&self) -> InputSpace {
+        self.first().space()
+    }
+
+    /// Name of the kernel, of the first process.
+    #[must_use]
+    pub fn kernel_name(&self) -> String {
+        self.first().kernel_name()
+    }
+
+    /// Hyper-parameters of the first process, to condition others at; `None` for a compressed table, which has no
+    /// measurements to condition on.
+    #[must_use]
+    pub fn hyper(&self) -> Option<Hyper> {
+        self.first().hyper()
+    }
+
+    /// The hyper-parameters as they stand in reports: an object, or `{"channels": [...]}` where channels have their own.
+    #[must_use]
+    pub fn hyper_report(&self) -> Value {
+        let mut all: Vec<Value> = self.posteriors.iter().map(|p| p.report()).collect();
+        if all.len() == 1 { all.swap_remove(0) } else { json!({ "channels": all }) }
+    }
+
+    /// Number of measured directions; of a compressed table, its valid cells.
+    #[must_use]
+    pub fn n_samples(&self) -> usize {
+        self.first().n_data()
+    }
+
+    /// Numbers that the model stores, another size than the number of samples: values or weights of all channels,
+    /// positions of nodes or samples, prior means, colour matrix, densities and hyper-parameters.
+    #[must_use]
+    pub fn n_floats(&self) -> usize {
+        self.offsets.len() + self.posteriors.iter().map(|p| p.n_floats()).sum::<usize>()
+    }
+
+    /// Noise variance of each channel, in squared target units.
+    #[must_use]
+    pub fn noise_variances(&self) -> Rgb {
+        let mut out = [0.0; 3];
+        for (first, posterior) in self.posteriors() {
+            out[first..].iter_mut().zip(posterior.noise_variances()).for_each(|(out, noise)| *out = noise);
+        }
+        out
+    }
+
+    /// The predictive mean of the target at each pair of directions, prior mean included. Angles that are not finite
+    /// give NaN.
+    #[must_use]
+    pub fn predict_target(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
+        let mut out = vec![self.offsets; angles.len()];
+        for (first, posterior) in self.posteriors() {
+            let means = posterior.predict_mean(angles);
+            for (out, means) in out.iter_mut().zip(means.chunks(posterior.n_channels())) {
+                out[first..].iter_mut().zip(means).for_each(|(out, mean)| *out += mean);
+            }
+        }
+        out
+    }
+
+    /// The predictive mean, carried back to sr^-1: one evaluation of the kernel per sample for a dense model, as many
+    /// multiply-adds for a lattice one.
+    #[must_use]
+    pub fn predict_mean(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
+        self.predict_target(angles).into_iter().map(|g| g.map(|g| self.transform.inverse(g))).collect()
+    }
+
+    /// Variance of the target at each pair of directions, for each channel. The first call on a loaded model may
+    /// factorise what only variances need.
+    ///
+    /// # Errors
+    /// Angles that are not finite, or a covariance that cannot be factorised or does not fit in memory.
+    pub fn predict_variance(&self, angles: &[HalfDiff], of: IntervalOf) -> Result<Vec<Rgb>> {
+        if let Some(bad) = angles.iter().find(|a| !a.is_finite()) {
+            return Err(Error::argument("angles", "finite numbers", format!("{bad:?}")));
+        }
+        let mut out = vec![[0.0; 3]; angles.len()];
+        for (first, posterior) in self.posteriors() {
+            let (count, channels) = (posterior.n_variances(), posterior.n_channels());
+            let variances = posterior.predict_variance(angles)?;
+            for (out, variances) in out.iter_mut().zip(variances.chunks(count)) {
+                for (channel, out) in out[first..first + channels].iter_mut().enumerate() {
+                    *out = variances[channel.min(count - 1)];
+                }
+            }
+        }
+        if of == IntervalOf::Observation {
+            let noise = self.noise_variances();
+            out.iter_mut().for_each(|v| v.iter_mut().zip(noise).for_each(|(v, noise)| *v += noise));
+        }
+        Ok(out)
+    }
+
+    /// Mean and 95 % interval at each pair of directions: the interval of the target, carried back, so it is
+    /// asymmetric about the mean and never negative.
+    ///
+    /// # Errors
+    /// Those of [`Model::predict_variance`].
+    pub fn predict(&self, angles: &[HalfDiff], of: IntervalOf) -> Result<Vec<Prediction>> {
+        let means = self.predict_target(angles);
+        let variances = self.predict_variance(angles, of)?;
+        let back = |g: f64| self.transform.inverse(g);
+        let predictions = std::iter::zip(means, variances).map(|(g, variance)| {
+            let ends: [(f64, f64); 3] =
+                std::array::from_fn(|c| interval_about(self.transform, g[c], variance[c].sqrt()));
+            Prediction { mean: g.map(back), lower: ends.map(|e| e.0), upper: ends.map(|e| e.1) }
+        });
+        Ok(predictions.collect())
+    }
+}
+
+/// Evaluates the predictive mean. One direction at a time this allocates: evaluate many by [`Brdf::eval_many`], or bake
+/// the model and look up its table.
+impl Brdf for Model {
+    fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return [0.0; 3];
+        }
+        self.eval_half_diff(HalfDiff::from_directions(wi, wo))
+    }
+
+    fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
+        self.predict_mean(&[angles])[0]
+    }
+
+    fn eval_many(&self, angles: &[HalfDiff], out: &mut [Rgb]) {
+        out.copy_from_slice(&self.predict_mean(angles));
+    }
+}

@@ -1,0 +1,17 @@
+//! Where to measure, what was measured, and how kernels and targets see it.
+
+pub(crate) mod lattice;
+pub(crate) mod layout;
+pub(crate) mod origin;
+pub(crate) mod set;
+pub(crate) mod space;
+pub(crate) mod symmetry;
+pub(crate) mod target;
+
+pub use lattice::LatticeLayout;
+pub use layout::{Layout, random_cells, random_directions};
+pub use origin::{Provenance, SampleLayout};
+pub use set::{Sample, SampleSet};
+pub use space::{InputSpace, WarpedBox};
+pub use symmetry::{Symmetry, detect_symmetry};
+pub use target::{MeanFunction, Transform};

@@ -1,0 +1,107 @@
+//! What was measured.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::base::error::Result;
+use crate::brdf::angles::HalfDiff;
+use crate::brdf::{Brdf, Rgb};
+use crate::sample::lattice::LatticeLayout;
+use crate::sample::layout::Layout;
+use crate::sample::origin::{Provenance, SampleLayout};
+
+/// One measured value of a BRDF.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Unit direction to the light, above the horizon, in the local frame (normal +z).
+    pub wi: Vector3<f64>,
+    /// Unit direction to the viewer, above the horizon.
+    pub wo: Vector3<f64>,
+    /// `f(wi, wo)` in sr^-1, cosine not included.
+    pub value: Rgb,
+}
+
+/// Measured values at known directions: what a model is fitted to. Samples keep the order of their source.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleSet {
+    /// What the source says about itself; empty where it says nothing.
+    pub description: String,
+    /// Half-difference angles of each sample.
+    pub angles: Vec<HalfDiff>,
+    /// `f` in sr^-1 at each of them.
+    pub values: Vec<Rgb>,
+    /// `[wi, wo]` of each sample as they were measured, turned about the normal as they were; empty where only the
+    /// angles are known.
+    pub directions: Vec<[Vector3<f64>; 2]>,
+    /// Where they come from. If [`Provenance::lattice`] is there, the samples are in the order of its nodes.
+    pub origin: Provenance,
+}
+
+impl SampleSet {
+    /// Evaluates `brdf` at the directions of a layout, in parallel. The origin names the layout only;
+    /// [`Source::measure`](crate::Source::measure) fills in the rest.
+    ///
+    /// # Errors
+    /// A broken layout.
+    pub fn measure(brdf: &dyn Brdf, layout: &Layout) -> Result<Self> {
+        let (angles, lattice, kind) = match layout {
+            Layout::Lattice(lattice) => {
+                lattice.validate()?;
+                (lattice.directions(), Some(lattice.clone()), SampleLayout::Lattice)
+            }
+            Layout::Random { count, seed } => {
+                let v_max = LatticeLayout::default().v_max;
+                (super::layout::random_directions(*count, v_max, *seed), None, SampleLayout::Random)
+            }
+            Layout::Cells { count, seed } => {
+                (super::layout::random_cells(*count, *seed), None, SampleLayout::Cells)
+            }
+        };
+        let mut values = vec![[0.0; 3]; angles.len()];
+        let blocks = angles.par_chunks(BLOCK).zip(values.par_chunks_mut(BLOCK));
+        blocks.for_each(|(angles, values)| brdf.eval_many(angles, values));
+        let origin = Provenance { layout: kind, lattice, ..Provenance::default() };
+        Ok(Self { angles, values, origin, ..Self::default() })
+    }
+
+    /// The number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.angles.len()
+    }
+
+    /// Whether there is no sample.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.angles.is_empty()
+    }
+
+    /// The lattice that the samples stand on, if they do; they are in the order of its nodes.
+    #[must_use]
+    pub fn lattice(&self) -> Option<&LatticeLayout> {
+        self.origin.lattice.as_ref()
+    }
+
+    /// The samples one by one. Where the measured directions are not known, the half vector lies above the x axis.
+    pub fn iter(&self) -> impl Iterator<Item = Sample> + '_ {
+        self.angles.iter().zip(&self.values).enumerate().map(|(i, (angles, &value))| {
+            let [wi, wo] = self.directions.get(i).copied().unwrap_or_else(|| angles.to_directions().into());
+            Sample { wi, wo, value }
+        })
+    }
+}
+
+/// Directions that a task evaluates at a time.
+const BLOCK: usize = 256;
+
+impl FromIterator<Sample> for SampleSet {
+    fn from_iter<I: IntoIterator<Item = Sample>>(samples: I) -> Self {
+        let mut set = Self::default();
+        for Sample { wi, wo, value } in samples {
+            set.angles.push(HalfDiff::from_directions(&wi, &wo));
+            set.directions.push([wi, wo]);
+            set.values.push(value);
+        }
+        set
+    }
+}

@@ -1,0 +1,212 @@
+//! From directions to the coordinates that kernels see.
+
+use std::f64::consts::FRAC_PI_2;
+
+use serde::{Deserialize, Serialize};
+
+use crate::base::error::{Error, Result};
+use crate::brdf::angles::{BoxPoint, HalfDiff, fold_phi_d};
+use crate::kernel::AxisMetric;
+use crate::sample::symmetry::Symmetry;
+
+/// The warped box, stretched where nodes crowd: coordinates
+/// `u' = 1 - (1 - u^(1/density))^tail`, `v' = min(v, 1)^(1/v_density)`, `phi' = warp_phi(phi)`.
+///
+/// The first is the distribution function of P. Kumaraswamy (1980), as in J. Snoek et al., "Input Warping for Bayesian
+/// Optimization" (2014); it is a power where `tail` is 1. Directions below the horizon get the coordinates of the
+/// horizon, `v' = 1`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WarpedBox {
+    /// Exponent of the warp along `u`.
+    pub density: f64,
+    /// Exponent of the warp along `v`.
+    pub v_density: f64,
+    /// Symmetry in `phi_d`; [`Symmetry::Bilateral`] folds `phi` to `[0, pi/2]`.
+    pub symmetry: Symmetry,
+    /// Second exponent of the warp along `u`: below 1 nodes crowd towards `theta_h = pi/2`, above 1 they thin out.
+    #[serde(default = "one")]
+    pub tail: f64,
+    /// Exponent of the warp along a folded `phi`; above 1 nodes crowd towards `phi = pi/2`.
+    #[serde(default = "one")]
+    pub phi_density: f64,
+}
+
+impl WarpedBox {
+    /// Coordinates of a pair of directions.
+    #[must_use]
+    pub fn coordinates(self, angles: HalfDiff) -> [f64; 3] {
+        let mut point = BoxPoint::from_half_diff(angles);
+        point.phi = fold_phi_d(point.phi);
+        if self.symmetry == Symmetry::Bilateral {
+            point = point.folded_bilateral();
+        }
+        [self.warp_u(point.u), self.warp_v(point.v), self.warp_phi(point.phi)]
+    }
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A density that is not positive and finite.
+    pub fn validate(self) -> Result<()> {
+        let densities = [self.density, self.v_density, self.tail, self.phi_density];
+        match densities.into_iter().find(|x| !(*x > 0.0 && x.is_finite())) {
+            None => Ok(()),
+            Some(x) => Err(Error::argument("node density", "a positive number", x)),
+        }
+    }
+
+    /// The first coordinate at `u = sqrt(theta_h / (pi/2))`.
+    #[must_use]
+    pub fn warp_u(self, u: f64) -> f64 {
+        let power = u.powf(1.0 / self.density);
+        // An exponent of 1 changes nothing, not even the last bit.
+        if self.tail == 1.0 { power } else { 1.0 - (1.0 - power.min(1.0)).powf(self.tail) }
+    }
+
+    /// The second coordinate at `v`; it stays at the horizon's 1 for all directions below the horizon.
+    #[must_use]
+    pub fn warp_v(self, v: f64) -> f64 {
+        v.min(1.0).powf(1.0 / self.v_density)
+    }
+
+    /// The third coordinate at `phi`, which a bilateral box has folded to `[0, pi/2]`:
+    /// `pi/2 (1 - (1 - phi / (pi/2))^(1/p))` there with `p = phi_density`, else `phi` itself.
+    ///
+    /// `theta_d_max` has a kink in `phi` at `pi/2`, where it depends on `|cos phi_d|`, and so has everything that is
+    /// smooth in `theta_d` when it is seen along `v`. In this coordinate the kink is a power of `p`: nearly the even
+    /// function that the mirrored kernel expects.
+    #[must_use]
+    pub fn warp_phi(self, phi: f64) -> f64 {
+        // An exponent of 1 changes nothing, not even the last bit.
+        if self.symmetry == Symmetry::Bilateral && self.phi_density != 1.0 {
+            FRAC_PI_2 * (1.0 - (1.0 - phi / FRAC_PI_2).max(0.0).powf(self.phi_density.recip()))
+        } else {
+            phi
+        }
+    }
+
+    /// Whether functions of each coordinate are even, about 0 and with the period of a chord: those of a folded `phi`
+    /// are.
+    #[must_use]
+    pub fn mirrored(self) -> [bool; 3] {
+        [false, false, self.symmetry == Symmetry::Bilateral]
+    }
+
+    /// Metrics of a lattice: `phi` is always an angle of period `pi` there, and a folded one is
+    /// [`WarpedBox::mirrored`] as well.
+    #[must_use]
+    pub fn lattice_metrics(self) -> [AxisMetric; 3] {
+        [AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord]
+    }
+}
+
+/// The input space of a process: three coordinates for each pair of directions, and how distance is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum InputSpace {
+    /// The warped box.
+    WarpedBox(WarpedBox),
+    /// `(theta_h, theta_d, phi_d)` in radians, as they are: the paper's own setting.
+    HalfDiff,
+}
+
+impl InputSpace {
+    /// Coordinates of a pair of directions.
+    #[must_use]
+    pub fn coordinates(self, angles: HalfDiff) -> [f64; 3] {
+        match self {
+            Self::WarpedBox(warped) => warped.coordinates(angles),
+            Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
+        }
+    }
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// A density that is not positive and finite.
+    pub fn validate(self) -> Result<()> {
+        match self {
+            Self::WarpedBox(warped) => warped.validate(),
+            Self::HalfDiff => Ok(()),
+        }
+    }
+
+    /// Whether `phi_d` and `pi - phi_d` have the same coordinates.
+    #[must_use]
+    pub fn is_bilateral(self) -> bool {
+        matches!(self, Self::WarpedBox(WarpedBox { symmetry: Symmetry::Bilateral, .. }))
+    }
+
+    /// Whether all directions of one `(theta_h, phi_d)` below the horizon have the same coordinates.
+    #[must_use]
+    pub fn stops_at_horizon(self) -> bool {
+        matches!(self, Self::WarpedBox(_))
+    }
+
+    /// How distance is measured along each coordinate.
+    #[must_use]
+    pub fn metrics(self) -> [AxisMetric; 3] {
+        let phi = match self {
+            Self::WarpedBox(WarpedBox { symmetry: Symmetry::Reciprocal, .. }) => AxisMetric::Chord,
+            _ => AxisMetric::Linear,
+        };
+        [AxisMetric::Linear, AxisMetric::Linear, phi]
+    }
+}
+
+impl From<WarpedBox> for InputSpace {
+    fn from(warped: WarpedBox) -> Self {
+        Self::WarpedBox(warped)
+    }
+}
+
+/// The tail and the density along `phi` of files that have none.
+fn one() -> f64 {
+    1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn warped_box_folds_and_stops_at_the_horizon() {
+        let folded = WarpedBox {
+            density: 1.5,
+            v_density: 0.8,
+            symmetry: Symmetry::Bilateral,
+            tail: 1.0,
+            phi_density: 1.0,
+        };
+        let circle = WarpedBox {
+            density: 1.5,
+            v_density: 0.8,
+            symmetry: Symmetry::Reciprocal,
+            tail: 1.0,
+            phi_density: 1.0,
+        };
+        let angles = HalfDiff { theta_h: 0.4, theta_d: 0.3, phi_d: 2.0 };
+        let tailed = WarpedBox {
+            density: 1.0,
+            v_density: 1.0,
+            symmetry: Symmetry::Bilateral,
+            tail: 2.0,
+            phi_density: 1.0,
+        };
+        assert!(
+            (tailed.warp_u(0.3) - 0.51).abs() < 1e-15
+                && tailed.warp_u(1.0) == 1.0
+                && tailed.warp_u(0.0) == 0.0
+        );
+        let mirrored = HalfDiff { phi_d: PI - 2.0, ..angles };
+        let (a, b) = (folded.coordinates(angles), folded.coordinates(mirrored));
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15), "{a:?} {b:?}");
+        assert_ne!(circle.coordinates(angles), circle.coordinates(mirrored));
+        let below = HalfDiff { theta_h: 1.5, theta_d: 1.5, phi_d: 0.0 };
+        assert_eq!(folded.coordinates(below)[1], 1.0);
+        assert!((folded.coordinates(angles)[0].powf(1.5).powi(2) * FRAC_PI_2 - 0.4).abs() < 1e-14);
+        assert_eq!(InputSpace::HalfDiff.coordinates(angles), [0.4, 0.3, 2.0]);
+    }
+}

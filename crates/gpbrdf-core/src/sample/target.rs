@@ -1,0 +1,131 @@
+//! BRDF values as regression targets, and back.
+
+use serde::{Deserialize, Serialize};
+
+use crate::base::error::{Error, Result};
+use crate::base::simd::exp_slice;
+
+/// What the Gaussian process is fitted to: a monotone function `g(f)` of a BRDF value `f` in sr^-1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Transform {
+    /// `g = f`: the paper's own setting.
+    Identity,
+    /// `g = ln(f + epsilon)`: errors relative to the value, and predictions that stay positive.
+    Log {
+        /// Keeps dark values apart from zero, sr^-1.
+        epsilon: f64,
+    },
+    /// `g = f^(1/3)`.
+    CubeRoot,
+}
+
+impl Default for Transform {
+    fn default() -> Self {
+        Self::Log { epsilon: 1e-3 }
+    }
+}
+
+impl Transform {
+    /// `g(f)`; negative values count as zero where the transform asks for it.
+    #[must_use]
+    pub fn forward(self, f: f64) -> f64 {
+        match self {
+            Self::Identity => f,
+            Self::Log { epsilon } => (f.max(0.0) + epsilon).ln(),
+            Self::CubeRoot => f.cbrt(),
+        }
+    }
+
+    /// `f(g)`, at least zero.
+    #[must_use]
+    pub fn inverse(self, g: f64) -> f64 {
+        match self {
+            Self::Identity => g.max(0.0),
+            Self::Log { epsilon } => (g.exp() - epsilon).max(0.0),
+            Self::CubeRoot => (g * g * g).max(0.0),
+        }
+    }
+
+    /// [`Transform::inverse`] of a whole slice; vectorised.
+    pub(crate) fn inverse_in_place(self, g: &mut [f64]) {
+        match self {
+            Self::Log { epsilon } => {
+                exp_slice(g);
+                g.iter_mut().for_each(|f| *f = (*f - epsilon).max(0.0));
+            }
+            _ => g.iter_mut().for_each(|x| *x = self.inverse(*x)),
+        }
+    }
+
+    /// `df / dg` at the target `g`.
+    pub(crate) fn slope_of_inverse(self, g: f64) -> f64 {
+        match self {
+            Self::Identity => 1.0,
+            Self::Log { .. } => g.exp(),
+            Self::CubeRoot => 3.0 * g * g,
+        }
+    }
+
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// `epsilon` not positive and finite.
+    pub fn validate(self) -> Result<()> {
+        match self {
+            Self::Log { epsilon } if !(epsilon > 0.0 && epsilon.is_finite()) => {
+                Err(Error::argument("epsilon of the logarithmic transform", "a positive number", epsilon))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The prior mean of the Gaussian process in target units.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum MeanFunction {
+    /// The average target of each channel.
+    #[default]
+    Constant,
+    /// Zero: the paper's own setting.
+    Zero,
+}
+
+impl MeanFunction {
+    /// The prior mean of targets that average `average`.
+    #[must_use]
+    pub fn offset(self, targets: &[f64]) -> f64 {
+        match self {
+            Self::Constant if !targets.is_empty() => targets.iter().sum::<f64>() / targets.len() as f64,
+            _ => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn transforms_round_trip_and_never_go_below_zero() {
+        for transform in [Transform::Identity, Transform::default(), Transform::CubeRoot] {
+            for f in [0.0, 1e-6, 0.3, 7.0, 5e3] {
+                let back = transform.inverse(transform.forward(f));
+                assert!((back - f).abs() <= 1e-12 * f.max(1e-2), "{transform:?} {f} {back}");
+            }
+            assert!(transform.inverse(-50.0) >= 0.0 && transform.forward(-1.0).is_finite());
+        }
+        assert!(Transform::Log { epsilon: 0.0 }.validate().is_err());
+        assert!(Transform::Log { epsilon: f64::NAN }.validate().is_err());
+    }
+
+    #[test]
+    fn constant_mean_is_the_average() {
+        assert_eq!(MeanFunction::Constant.offset(&[1.0, 3.0]), 2.0);
+        assert_eq!(MeanFunction::Constant.offset(&[]), 0.0);
+        assert_eq!(MeanFunction::Zero.offset(&[1.0, 3.0]), 0.0);
+    }
+}
