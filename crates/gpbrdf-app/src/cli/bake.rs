@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::{
-    AtomicFile, Brdf, BrdfTable, Environment, ExrChannels, ExrPart, N_CELLS, Picture, SigmaTable,
-    SliceOptions, Source, render_env, slice_figure, sphere_figure, write_merl_to, write_table_exr_to,
-};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::figure::{Picture, SliceOptions, slice_figure, sphere_figure};
+use gpbrdf_core::formats::{ExrChannels, ExrPart, write_merl_to, write_table_exr_to};
+use gpbrdf_core::judge::render_env;
+use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
 use super::input::{environment, open};
 use super::terminal::Terminal;
@@ -187,7 +189,7 @@ fn channels(sigma: &SigmaTable) -> Vec<[f32; 3]> {
 
 fn slice_picture(name: &str, truth: Option<&BrdfTable>, mean: &BrdfTable) -> Result<Picture> {
     let truth = truth.map(|truth| truth as &dyn Brdf);
-    Ok(slice_figure(name, truth, mean, None, &SliceOptions::default())?)
+    Ok(slice_figure(name, truth, mean, &SliceOptions::default())?)
 }
 
 fn sphere_picture(
@@ -199,5 +201,5 @@ fn sphere_picture(
 ) -> Result<Picture> {
     let tables: Vec<&BrdfTable> = std::iter::once(mean).chain(truth).collect();
     let images = render_env(&tables, environment, PICTURE_SIZE);
-    Ok(sphere_figure(name, images.get(1), &images[0], None, psnr)?)
+    Ok(sphere_figure(name, images.get(1), &images[0], psnr)?)
 }

@@ -2,15 +2,16 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::{BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma};
+use gpbrdf_core::base::number::significant;
+use gpbrdf_core::{Content, IntervalOf, Metrics, Model, SampleSet, Source, bake_mean, bake_sigma};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
 use super::terminal::Terminal;
-use crate::job::{judge, metric_lines, significant};
+use crate::job::{judge, metric_lines};
 
 #[derive(Args, Debug)]
 pub(crate) struct Eval {
@@ -41,21 +42,13 @@ impl Eval {
         if let (Content::Model(model), Content::Samples(samples)) = (&prediction.content, &truth.content) {
             return self.against_samples(terminal, &prediction, &truth, model, samples);
         }
-        let table = |source: &Source| -> Result<BrdfTable> {
-            match source.table() {
-                Some(table) => Ok(table.into_owned()),
-                None => bail!(
-                    "{}: expected a table, a model or a BRDF that can be evaluated at any direction, found scattered samples",
-                    source.origin()
-                ),
-            }
-        };
-        let truth_table = terminal.stage("Tabulating the truth", || table(&truth))?;
+        let truth_table = terminal.stage("Tabulating the truth", || truth.table())?;
         let metrics = if let Content::Model(model) = &prediction.content {
             let (mean, sigma) = terminal.stage("Baking", || (bake_mean(model), bake_sigma(model)));
+            let sigma = sigma?;
             terminal.stage("Comparing", || judge(&truth_table, model, &mean, Some(&sigma), &environment))?
         } else {
-            let predicted = table(&prediction)?;
+            let predicted = terminal.stage("Tabulating", || prediction.table())?;
             terminal.stage("Comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
         };
         if self.json {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 
 use super::input::open;
 use super::terminal::Terminal;

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::{Content, merl_material_name};
+use gpbrdf_core::formats::merl_material_name;
+use gpbrdf_core::{Content, detect_symmetry};
 use serde_json::json;
 
 use super::input::open;
 use super::terminal::Terminal;
-use crate::job::describe;
 
 #[derive(Args, Debug)]
 pub(crate) struct Info {
@@ -36,23 +36,22 @@ impl Info {
                 })
             }
             Content::Samples(samples) => {
-                let largest = samples.samples.iter().flat_map(|s| s.value).fold(0.0, f64::max);
-                json!({ "samples": samples.samples.len(), "largest_value": largest })
+                let largest = samples.values.as_flattened().iter().copied().fold(0.0, f64::max);
+                json!({ "samples": samples.len(), "largest_value": largest })
             }
-            Content::Function(brdf) => {
-                let symmetry = gpbrdf_core::detect_symmetry(brdf.as_ref());
+            Content::Function { brdf, .. } => {
+                let symmetry = detect_symmetry(brdf.as_ref());
                 json!({ "symmetry": symmetry })
             }
             Content::Model(model) => {
-                let (solver, kernel, hyperparameters) = describe(model);
                 json!({
-                    "samples": model.samples(),
-                    "floats": model.floats(),
-                    "solver": solver,
-                    "kernel": kernel,
+                    "samples": model.n_samples(),
+                    "floats": model.n_floats(),
+                    "solver": model.solver(),
+                    "kernel": model.kernel_name(),
                     "transform": model.transform,
                     "provenance": model.provenance,
-                    "hyperparameters": hyperparameters,
+                    "hyperparameters": model.hyper_report(),
                 })
             }
         };

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use gpbrdf_core::{Environment, Source, materials};
+use gpbrdf_core::brdf::materials;
+use gpbrdf_core::formats::read_environment;
+use gpbrdf_core::{Environment, Source};
 
 /// Opens the file of this name, or else the built-in material.
 pub(crate) fn open(input: &Path) -> Result<Source> {
@@ -30,7 +32,7 @@ pub(crate) fn open(input: &Path) -> Result<Source> {
 /// The environment of the image metrics: a file, or the built-in studio.
 pub(crate) fn environment(path: Option<&Path>) -> Result<Environment> {
     Ok(match path {
-        Some(path) => Environment::read(path)?,
+        Some(path) => read_environment(path)?,
         None => Environment::studio(),
     })
 }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::materials;
+use gpbrdf_core::brdf::materials;
 use serde_json::json;
 
 use super::terminal::Terminal;

@@ -73,7 +73,7 @@ pub fn main() -> ExitCode {
     let terminal = Terminal::new(arguments.quiet, arguments.verbose);
     // Ctrl-C: no partial file stays behind, nor an empty folder.
     let handler = ctrlc::set_handler(|| {
-        let _held = (gpbrdf_core::remove_pending(), output::remove_empty_folders());
+        let _held = (gpbrdf_core::base::remove_pending(), output::remove_empty_folders());
         std::process::exit(130);
     });
     if let Err(error) = handler {

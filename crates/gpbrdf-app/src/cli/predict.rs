@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::{AtomicFile, IntervalOf, Model, read_directions_csv};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::formats::read_directions_csv;
+use gpbrdf_core::{IntervalOf, Model};
 
 use super::terminal::Terminal;
 
@@ -29,7 +31,7 @@ impl Predict {
         let model = Model::load(&self.model)?;
         let directions = read_directions_csv(&self.directions)?;
         let of = if self.latent { IntervalOf::Latent } else { IntervalOf::Observation };
-        let predictions = terminal.stage("Predicting", || model.predict(&directions.angles, of));
+        let predictions = terminal.stage("Predicting", || model.predict(&directions.angles, of))?;
         let mut text = directions.columns.join(",");
         for part in ["", "_lower", "_upper"] {
             for channel in ["r", "g", "b"] {

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use gpbrdf_core::{Source, materials as built_in_materials, read_neural_csv, sha256_file};
+use gpbrdf_core::Source;
+use gpbrdf_core::brdf::materials as built_in_materials;
+use gpbrdf_core::formats::{read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
 use super::input::environment;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 use gpbrdf_render::{ShaderLanguage, translate};
 
 use super::terminal::Terminal;

@@ -4,9 +4,10 @@ use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use gpbrdf_core::base::number::significant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::job::{Found, Observer, Progress, Report, Stage, significant};
+use crate::job::{Found, Observer, Progress, Report, Stage};
 
 /// Standard output and standard error, as the user wants them, with a spinner for what takes long.
 #[derive(Clone, Debug)]
@@ -119,7 +120,7 @@ impl Observer for Terminal {
         match found {
             Found::Samples(measured) => self.detail(&format!("{} samples", measured.samples.angles.len())),
             Found::Cells(cells) => {
-                self.detail(&format!("mean absolute error {} /sr", significant(cells.mae)));
+                self.detail(&format!("mean absolute error {} /sr", significant(cells.mae, 4)));
             }
             Found::Mean { fitted, .. } => {
                 if let Some(value) = fitted.log_marginal_likelihood {

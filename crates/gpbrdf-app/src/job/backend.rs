@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use gpbrdf_core::{BrdfTable, Model, Process, SigmaTable, bake_mean};
+use gpbrdf_core::gp::DeviceForm;
+use gpbrdf_core::{BrdfTable, Model, SigmaTable, bake_mean};
 use gpbrdf_render::{AdapterChoice, Baker, Context, Error, Precision};
 
 use super::run::{Baked, Observer, Progress, Run};
@@ -41,7 +42,7 @@ impl Backend {
                         observer.warn(&format!("{error}; baking on the CPU"));
                         Ok(None)
                     }
-                    Err(Error::Cancelled) => Err(gpbrdf_core::Error::Cancelled.into()),
+                    Err(error) if error.is_cancelled() => Err(gpbrdf_core::Error::Cancelled.into()),
                     Err(error) => Err(anyhow::Error::from(error)),
                 })?;
             if let Some((mean, sigma)) = tables {
@@ -58,8 +59,8 @@ impl Backend {
         match self {
             Self::Cpu => Ok(None),
             Self::Gpu => Ok(Some(Context::open(AdapterChoice::Any)?)),
-            // Tens of milliseconds on a processor, less than it takes to open a device.
-            Self::Auto if !matches!(model.process, Process::Dense(_)) => Ok(None),
+            // Sums of products take tens of milliseconds on the processor, less than it takes to open a device.
+            Self::Auto if !is_kernel_sum(model) => Ok(None),
             Self::Auto => match Context::open(AdapterChoice::Hardware) {
                 Ok(context) => Ok(Some(context)),
                 Err(error) => {
@@ -71,7 +72,12 @@ impl Backend {
     }
 }
 
-/// The mean and, of a lattice model whose channels share it, sigma.
+/// Whether any part of a model is a sum over samples.
+fn is_kernel_sum(model: &Model) -> bool {
+    model.posteriors().any(|(_, posterior)| matches!(posterior.device_form(), DeviceForm::KernelSum(_)))
+}
+
+/// The mean and, of a model in products along the axes whose channels share it, sigma.
 fn bake_on_device(
     context: &Context,
     model: &Model,
@@ -82,7 +88,8 @@ fn bake_on_device(
         if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let texture = Baker::new(context)?.bake(model, Precision::Single, &mut progress)?;
-    let shared = matches!(&model.process, Process::Lattice(groups) if groups.len() == 1);
+    let shares = model.posteriors().all(|(_, p)| p.n_channels() == 3 && p.n_variances() == 1);
+    let shared = shares && !is_kernel_sum(model);
     let (mean, sigma) = texture.to_tables(context)?;
     Ok((mean, shared.then_some(sigma)))
 }

@@ -2,7 +2,8 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
-use gpbrdf_core::{CellWeights, InducingSize};
+use gpbrdf_core::InducingSize;
+use gpbrdf_core::model::CellWeights;
 use serde::{Deserialize, Serialize};
 
 use super::choices::parse_lattice;

@@ -1,7 +1,7 @@
 //! What a dense fit will take, said before it starts.
 
 use anyhow::Result;
-use gpbrdf_core::dense_cost;
+use gpbrdf_core::gp::dense_cost;
 
 /// Evaluations of likelihood and gradient that a dense search usually takes.
 const DENSE_EVALUATIONS: usize = 40;

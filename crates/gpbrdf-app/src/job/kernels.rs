@@ -7,16 +7,6 @@ use anyhow::{Result, bail};
 use gpbrdf_core::Shape;
 use serde::{Deserialize, Serialize};
 
-/// The shapes and their names; `matern` has the smoothness of `--nu`.
-const SHAPES: [(&str, Shape); 6] = [
-    ("se", Shape::SquaredExponential),
-    ("rq", Shape::RationalQuadratic { alpha: 1.0 }),
-    ("matern12", Shape::Matern12),
-    ("matern32", Shape::Matern32),
-    ("matern52", Shape::Matern52),
-    ("matern", Shape::Matern { nu: 1.5 }),
-];
-
 /// The kernel along `theta_h`, `theta_d` and `phi_d`, each a sum of names joined by `+`. As text it is one
 /// sum for all axes, or three joined by commas. Off a lattice the first is the kernel of all axes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,20 +33,21 @@ impl Kernels {
     }
 }
 
+/// The shape of this name; `nu` is the smoothness of `matern`.
 fn shape(name: &str, nu: f64) -> Result<Shape> {
-    match SHAPES.iter().find(|(of, _)| *of == name) {
-        Some((_, Shape::Matern { .. })) => Ok(Shape::Matern { nu }),
-        Some((_, shape)) => Ok(*shape),
-        None => bail!(
+    match Shape::from_name(name) {
+        Ok(Shape::Matern { .. }) => Ok(Shape::Matern { nu }),
+        Ok(shape) => Ok(shape),
+        Err(_) => bail!(
             "--kernel: expected shapes out of {} joined by +, found \"{name}\"",
-            SHAPES.map(|(name, _)| name).join(", ")
+            Shape::ALL.map(Shape::name).join(", ")
         ),
     }
 }
 
 impl Default for Kernels {
     fn default() -> Self {
-        Self(std::array::from_fn(|_| "matern52".to_owned()))
+        Self(std::array::from_fn(|_| Shape::Matern52.name().to_owned()))
     }
 }
 
@@ -95,40 +86,34 @@ impl fmt::Display for Kernels {
     }
 }
 
-/// What the viewer's lists show and set: one shape along each axis.
+/// One shape along each axis, as the viewer's lists show and set it.
 #[cfg(feature = "viewer")]
 impl Kernels {
-    /// The names to choose from.
-    pub(crate) const NAMES: [&'static str; 5] = ["matern52", "matern32", "matern12", "se", "rq"];
+    /// The shapes to choose from.
+    pub(crate) const CHOICES: [Shape; 5] = [
+        Shape::Matern52,
+        Shape::Matern32,
+        Shape::Matern12,
+        Shape::SquaredExponential,
+        Shape::RationalQuadratic { alpha: 1.0 },
+    ];
 
-    /// The name of a shape for people.
-    pub(crate) fn label(name: &str) -> &'static str {
-        match name {
-            "se" => "Squared exponential",
-            "rq" => "Rational quadratic",
-            "matern12" => "Matérn 1/2",
-            "matern32" => "Matérn 3/2",
-            "matern52" => "Matérn 5/2",
-            _ => "A sum",
-        }
-    }
-
-    /// The name of the kernel along `axis`, if it is one of [`Self::NAMES`].
-    pub(crate) fn name(&self, axis: usize) -> Option<&'static str> {
+    /// The kernel along `axis`, if it is one of [`Self::CHOICES`].
+    pub(crate) fn choice(&self, axis: usize) -> Option<Shape> {
         let kernel = self.0.get(axis)?;
-        Self::NAMES.into_iter().find(|name| name == kernel)
+        Self::CHOICES.into_iter().find(|shape| shape.name() == kernel)
     }
 
     /// Sets the kernel along `axis`.
-    pub(crate) fn set(&mut self, axis: usize, name: &str) {
+    pub(crate) fn set(&mut self, axis: usize, shape: Shape) {
         if let Some(kernel) = self.0.get_mut(axis) {
-            name.clone_into(kernel);
+            shape.name().clone_into(kernel);
         }
     }
 
     /// Sets the kernel of all axes.
-    pub(crate) fn set_all(&mut self, name: &str) {
-        (0..3).for_each(|axis| self.set(axis, name));
+    pub(crate) fn set_all(&mut self, shape: Shape) {
+        (0..3).for_each(|axis| self.set(axis, shape));
     }
 }
 
@@ -160,6 +145,6 @@ mod tests {
             "expected one kernel or three joined by commas, found 2"
         );
         assert!("se+cubic".parse::<Kernels>().unwrap().shapes(1.0).is_err());
-        assert_eq!(Kernels::default().shapes(1.0).unwrap()[0], gpbrdf_core::FitOptions::default().kernel);
+        assert_eq!(Kernels::default().shapes(1.0).unwrap()[0], gpbrdf_core::FitOptions::default().kernel[0]);
     }
 }

@@ -14,7 +14,6 @@ mod forecast;
 mod hyper;
 mod judge;
 mod kernels;
-mod number;
 mod report;
 mod run;
 mod sample;
@@ -26,11 +25,10 @@ pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformCho
 pub(crate) use compression::Compression;
 pub(crate) use forecast::samples_within;
 #[cfg(feature = "viewer")]
-pub(crate) use hyper::{HyperParameter, hyper_parameters, set_hyper_parameter};
+pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
-pub(crate) use number::significant;
-pub(crate) use report::{Report, describe, metric_lines};
+pub(crate) use report::{Report, metric_lines};
 pub(crate) use run::{Baked, Baking, Fitted, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
 pub(crate) use sample::{Measured, SampleKey};
 pub(crate) use spec::{ModelSpec, PAPER_SAMPLES};

@@ -1,16 +1,19 @@
 //! From a source to a model, its tables and how they compare with the truth, in stages that somebody follows.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
+use gpbrdf_core::judge::{CellMetrics, Interval};
+use gpbrdf_core::model::Conditioned;
 use gpbrdf_core::{
-    BrdfTable, CellMetrics, Content, Environment, Error, FitReport, Hyper, Interval, Metrics, Model,
-    Provenance, SigmaTable, Source, TableFitOptions, bake_sigma, condition, fit_per_axis, fit_table,
+    BrdfTable, CompressOptions, Content, Environment, Error, Fit, FitOptions, FitReport, Metrics, Model,
+    SigmaTable, Source, bake_sigma, compress, condition, fit,
 };
 
 use super::backend::Backend;
-use super::judge::{cell_interval, judge};
+use super::judge::{intervals, judge};
 use super::sample::{Measured, symmetry};
 use super::spec::ModelSpec;
 use super::stage::{Seconds, Stage};
@@ -128,7 +131,8 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
-    fn searched(model: Model, measured: Option<Measured>, reports: Vec<FitReport>) -> Self {
+    fn searched(fit: Fit, measured: Option<Measured>) -> Self {
+        let Fit { model, reports } = fit;
         let value = reports.iter().map(|report| report.log_marginal_likelihood).sum();
         Self { model: Arc::new(model), measured, reports, log_marginal_likelihood: Some(value) }
     }
@@ -217,14 +221,8 @@ impl Run {
     /// The model of a source, by compression of its table or from samples.
     fn fit(&mut self, job: &Job<'_>) -> Result<Fitted> {
         let (source, spec) = (job.source, job.spec);
-        let provenance = Provenance {
-            material: source.name.clone(),
-            source: source.origin(),
-            sha256: source.sha256.clone(),
-            ..Provenance::default()
-        };
         if let Some(options) = spec.compress_options()? {
-            return self.compress(source, spec, options, provenance);
+            return self.compress(source, spec, options);
         }
         let observer = self.observer();
         let measured = self.stage(Stage::Sample, || match &job.measured {
@@ -233,50 +231,35 @@ impl Run {
         })?;
         observer.found(Found::Samples(&measured));
         let samples = Arc::clone(&measured.samples);
-        let (options, shapes) = spec.fit_options(measured.symmetry)?;
+        let options = spec.fit_options(measured.symmetry)?;
         self.stage(Stage::Fit, || {
-            // A lattice's hyper-parameters fit no scattered samples, nor the other way round.
-            let by_hand = spec.hyper.as_ref();
-            let by_hand = by_hand.filter(|h| matches!(h, Hyper::Lattice(_)) == samples.lattice.is_some());
-            if let Some(hyper) = by_hand {
-                let (model, value) = condition(&samples, &options, hyper, provenance)?;
+            // Hyper-parameters of one solver mean nothing to another.
+            let solver = options.solver.resolve(samples.lattice().is_some());
+            if let Some(hyper) = spec.hyper.as_ref().filter(|hyper| hyper.solver == solver) {
+                let Conditioned { model, log_marginal_likelihood } = condition(&samples, &options, hyper)?;
                 return Ok(Fitted {
                     model: Arc::new(model),
                     measured: Some(measured),
                     reports: Vec::new(),
-                    log_marginal_likelihood: Some(value),
+                    log_marginal_likelihood: Some(log_marginal_likelihood),
                 });
             }
-            let evaluations = std::cell::Cell::new(0);
-            let cancelled = || {
-                evaluations.set(evaluations.get() + 1);
-                observer.progress(Progress::Evaluations(evaluations.get()));
-                observer.is_cancelled()
-            };
-            let shapes = shapes.each_ref().map(Vec::as_slice);
-            let (model, reports) = fit_per_axis(&samples, &options, shapes, provenance, &cancelled)?;
-            Ok(Fitted::searched(model, Some(measured), reports))
+            let observer = gpbrdf_core::Observer::new(move |evaluations| {
+                observer.progress(Progress::Evaluations(evaluations));
+                if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            let fit = fit(&samples, &FitOptions { observer, ..options })?;
+            Ok(Fitted::searched(fit, Some(measured)))
         })
     }
 
     /// Fits inducing lattices to the whole table of a source.
-    fn compress(
-        &mut self,
-        source: &Source,
-        spec: &ModelSpec,
-        options: TableFitOptions,
-        provenance: Provenance,
-    ) -> Result<Fitted> {
-        let table = self.stage(Stage::Tabulate, || Ok(source.table()))?;
-        let (Some(table), Some(brdf)) = (table, source.brdf()) else {
-            bail!(
-                "{}: expected a whole table for inducing lattices, found scattered samples",
-                source.origin()
-            );
-        };
-        let options = TableFitOptions { symmetry: symmetry(spec, brdf, &*self.observer), ..options };
-        let (model, reports) = self.stage(Stage::Fit, || Ok(fit_table(&table, &options, provenance)?))?;
-        Ok(Fitted::searched(model, None, reports))
+    fn compress(&mut self, source: &Source, spec: &ModelSpec, options: CompressOptions) -> Result<Fitted> {
+        let table = self.stage(Stage::Tabulate, || Ok(source.table()?))?;
+        let options =
+            CompressOptions { symmetry: symmetry(spec, source.brdf()?, &*self.observer), ..options };
+        let fit = self.stage(Stage::Fit, || Ok(compress(&table, &options, source.provenance())?))?;
+        Ok(Fitted::searched(fit, None))
     }
 
     /// The tables of a model.
@@ -284,7 +267,7 @@ impl Run {
         let mut baked = baking.backend.bake_mean(self, &fitted.model)?;
         self.observer.found(Found::Mean { fitted, mean: &baked.mean, seconds: &self.seconds });
         if baking.sigma && baked.sigma.is_none() {
-            baked.sigma = Some(Arc::new(self.stage(Stage::BakeSigma, || Ok(bake_sigma(&fitted.model)))?));
+            baked.sigma = Some(Arc::new(self.stage(Stage::BakeSigma, || Ok(bake_sigma(&fitted.model)?))?));
         }
         baked.sigma = baked.sigma.filter(|_| baking.sigma);
         if let Some(sigma) = &baked.sigma {
@@ -300,10 +283,10 @@ impl Run {
             Truth::Known(truth) => Ok(Some(Arc::clone(truth))),
             Truth::Tabulated if matches!(job.source.content, Content::Samples(_)) => Ok(None),
             Truth::Tabulated => {
-                let table = self.stage(Stage::Truth, || Ok(job.source.table().map(|t| t.into_owned())))?;
-                let truth = table.map(Arc::new);
-                truth.iter().for_each(|truth| self.observer.found(Found::Truth(truth)));
-                Ok(truth)
+                let truth = self.stage(Stage::Truth, || Ok(job.source.table()?.into_owned()))?;
+                let truth = Arc::new(truth);
+                self.observer.found(Found::Truth(&truth));
+                Ok(Some(truth))
             }
         }
     }
@@ -321,15 +304,17 @@ impl Run {
             Judging::Nothing => Ok(None),
             Judging::Cells => {
                 let cells = self.stage(Stage::Compare, || {
-                    let interval = sigma.map(|sigma| cell_interval(model, mean, sigma));
-                    let interval = interval.as_ref().map(|interval| interval as &Interval<'_>);
+                    let intervals = sigma.map(|sigma| intervals(model, mean, sigma));
+                    let cell = intervals.as_ref().map(|intervals| |cell| intervals.cell(cell));
+                    let interval = cell.as_ref().map(|cell| cell as &Interval<'_>);
                     Ok(CellMetrics::new(truth, mean, interval)?)
                 })?;
                 self.observer.found(Found::Cells(&cells));
                 Ok(None)
             }
             Judging::All(environment) => {
-                let metrics = self.stage(Stage::Compare, || judge(truth, model, mean, sigma, environment))?;
+                let metrics =
+                    self.stage(Stage::Compare, || Ok(judge(truth, model, mean, sigma, environment)?))?;
                 self.observer.found(Found::Cells(&metrics.cells));
                 Ok(Some(metrics))
             }
@@ -442,7 +427,7 @@ mod tests {
     fn hyper_parameters_set_by_hand_are_taken_where_they_fit() {
         let (source, spec) = (Source::built_in("ward").unwrap(), small());
         let found = Run::new(Witness::default()).job(&Job::new(&source, &spec)).unwrap().fitted;
-        let spec = ModelSpec { hyper: Hyper::of(&found.model), ..spec };
+        let spec = ModelSpec { hyper: found.model.hyper(), ..spec };
         let by_hand = Run::new(Witness::default()).job(&Job::new(&source, &spec)).unwrap().fitted;
         assert!(by_hand.reports.is_empty());
         let gap = by_hand.log_marginal_likelihood.unwrap() - found.log_marginal_likelihood.unwrap();

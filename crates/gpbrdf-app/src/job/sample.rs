@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use gpbrdf_core::{Content, Layout, SampleSet, Solver, Source, Symmetry, detect_symmetry};
+use gpbrdf_core::{Brdf, Content, Layout, SampleSet, Solver, Source, Symmetry, detect_symmetry};
 
 use super::choices::{LayoutChoice, SymmetryChoice};
 use super::forecast::forecast;
@@ -62,14 +62,14 @@ impl Measured {
         };
         let key = spec.sample_key();
         if let Content::Samples(samples) = &source.content {
-            announce(samples.samples.len())?;
+            announce(samples.len())?;
             let symmetry = match spec.symmetry {
                 SymmetryChoice::Auto | SymmetryChoice::Bilateral => Symmetry::Bilateral,
                 SymmetryChoice::Reciprocal => Symmetry::Reciprocal,
             };
-            return Ok(Self { samples: Arc::new(SampleSet::from(samples)), symmetry, key });
+            return Ok(Self { samples: Arc::new((**samples).clone()), symmetry, key });
         }
-        let Some(brdf) = source.brdf() else { bail!("{}: nothing to sample", source.origin()) };
+        let brdf = source.brdf()?;
         if let Content::Table(table) = &source.content
             && !table.values().iter().any(|v| v.iter().all(|&x| x >= 0.0))
         {
@@ -82,12 +82,12 @@ impl Measured {
             Layout::Lattice(_) => {}
             Layout::Random { count, .. } | Layout::Cells { count, .. } => announce(*count)?,
         }
-        Ok(Self { samples: Arc::new(SampleSet::measure(brdf, &layout)?), symmetry, key })
+        Ok(Self { samples: Arc::new(source.measure(&layout)?), symmetry, key })
     }
 }
 
 /// The symmetry that was asked for, or the measured one.
-pub(super) fn symmetry(spec: &ModelSpec, brdf: &dyn gpbrdf_core::Brdf, observer: &dyn Observer) -> Symmetry {
+pub(super) fn symmetry(spec: &ModelSpec, brdf: &dyn Brdf, observer: &dyn Observer) -> Symmetry {
     let symmetry = match spec.symmetry {
         SymmetryChoice::Auto => detect_symmetry(brdf),
         SymmetryChoice::Bilateral => Symmetry::Bilateral,

@@ -3,9 +3,10 @@
 
 use anyhow::{Result, bail};
 use clap::Args;
+use gpbrdf_core::gp::OptimizeOptions;
 use gpbrdf_core::{
-    Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, OptimizeOptions, Shape, Solver, Source,
-    Symmetry, TableFitOptions, Transform,
+    CompressOptions, Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Solver, Source,
+    Symmetry, Transform,
 };
 use serde::{Deserialize, Serialize};
 
@@ -126,7 +127,7 @@ impl ModelSpec {
                     "{}: expected no --lattice and no --samples for scattered measurements, found one: \
                      all {} are used",
                     source.origin(),
-                    samples.samples.len()
+                    samples.len()
                 );
             }
         } else if self.layout == LayoutChoice::Lattice && self.solver != Solver::Dense {
@@ -180,29 +181,28 @@ impl ModelSpec {
         Ok(lattice)
     }
 
-    /// The options of a fit to samples that rely on `symmetry`, and the shapes of the kernel along each axis.
+    /// The options of a fit to samples that rely on `symmetry`.
     ///
     /// # Errors
     /// A kernel of an unknown name.
-    pub(super) fn fit_options(&self, symmetry: Symmetry) -> Result<(FitOptions, [Vec<Shape>; 3])> {
-        let shapes = self.kernel.shapes(self.nu)?;
+    pub(super) fn fit_options(&self, symmetry: Symmetry) -> Result<FitOptions> {
         let lattice = LatticeLayout::default();
         let node_density = self.node_density.unwrap_or(lattice.node_density);
-        let options = FitOptions {
+        Ok(FitOptions {
             solver: self.solver,
-            kernel: shapes[0].clone(),
+            kernel: self.kernel.shapes(self.nu)?,
             transform: self.transform(),
             mean: self.mean,
             noise: self.noise.noise(),
             per_channel: self.per_channel,
-            space: LatticeLayout { node_density, symmetry, ..lattice }.space(),
+            space: LatticeLayout { node_density, symmetry, ..lattice }.space().into(),
             optimize: OptimizeOptions {
                 restarts: self.restarts,
                 seed: self.seed,
                 ..OptimizeOptions::default()
             },
-        };
-        Ok((options, shapes))
+            ..FitOptions::default()
+        })
     }
 
     fn transform(&self) -> Transform {
@@ -213,11 +213,11 @@ impl ModelSpec {
         }
     }
 
-    /// The options of a compression, if one is asked for; of this symmetry.
+    /// The options of a compression, if one is asked for, but for the symmetry.
     ///
     /// # Errors
     /// Options that a compression does not heed, or several kernel shapes.
-    pub(super) fn compress_options(&self) -> Result<Option<TableFitOptions>> {
+    pub(super) fn compress_options(&self) -> Result<Option<CompressOptions>> {
         let Some(size) = self.compression.size() else { return Ok(None) };
         refuse_others(&[
             ("--layout", self.layout == LayoutChoice::Lattice),
@@ -234,7 +234,7 @@ impl ModelSpec {
         };
         let transform = self.transform();
         let weights = self.compression.weights();
-        Ok(Some(TableFitOptions { size, kernel, transform, weights, ..TableFitOptions::default() }))
+        Ok(Some(CompressOptions { size, kernel, transform, weights, ..CompressOptions::default() }))
     }
 }
 

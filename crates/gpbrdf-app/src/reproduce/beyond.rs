@@ -2,9 +2,10 @@
 //! of the interval.
 
 use anyhow::Result;
+use gpbrdf_core::brdf::analytic::NEURAL_FLOATS;
 use gpbrdf_core::{
-    Brdf, BrdfTable, FitOptions, InducingSize, LatticeLayout, Metrics, NEURAL_FLOATS, Provenance,
-    TableFitOptions, detect_symmetry, fit_table,
+    Brdf, BrdfTable, CompressOptions, FitOptions, InducingSize, LatticeLayout, Metrics, Provenance, compress,
+    detect_symmetry,
 };
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -53,7 +54,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
                 json!(material.name()),
                 json!(material.origin),
                 json!(n),
-                json!(fitted.model.floats()),
+                json!(fitted.model.n_floats()),
                 number(fitted.fit_seconds),
             ];
             row.extend(cells(&MEASURES, &fitted.metrics));
@@ -103,20 +104,20 @@ fn against_neural(
         let metrics = Metrics::new(truth, &predicted, &context.environment, None)?;
         add("Neural BRDF", NEURAL_FLOATS, Value::Null, &metrics);
     }
-    let options = TableFitOptions {
+    let options = CompressOptions {
         size: InducingSize::Floats(NEURAL_FLOATS),
         symmetry: detect_symmetry(truth),
-        ..TableFitOptions::default()
+        ..CompressOptions::default()
     };
     let start = Instant::now();
-    let (model, _) = fit_table(truth, &options, Provenance::default())?;
+    let model = compress(truth, &options, Provenance::default())?.model;
     let seconds = start.elapsed().as_secs_f64();
-    let floats = model.floats();
+    let floats = model.n_floats();
     let fitted = context.compare(truth, model, seconds, true)?;
     add("inducing lattices", floats, number(seconds), &fitted.metrics);
     let samples = material.measure(|symmetry| Ok(LatticeLayout::with_shape(EQUAL_SHAPE, symmetry)))?;
     let fitted = context.fit_and_compare(truth, &samples, &FitOptions::default(), true)?;
     let name = format!("lattice of {} measurements", samples.angles.len());
-    add(&name, fitted.model.floats(), number(fitted.fit_seconds), &fitted.metrics);
+    add(&name, fitted.model.n_floats(), number(fitted.fit_seconds), &fitted.metrics);
     Ok(())
 }

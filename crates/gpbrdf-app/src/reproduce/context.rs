@@ -5,9 +5,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
+use gpbrdf_core::brdf::analytic::NeuralBrdf;
+use gpbrdf_core::figure::Picture;
+use gpbrdf_core::formats::{merl_material_name, sha256_file};
 use gpbrdf_core::{
-    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, NeuralBrdf, Provenance,
-    SampleSet, Source, Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
+    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet, Source, Symmetry,
+    bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
@@ -36,7 +39,7 @@ impl Outcome {
     }
 
     /// Adds a picture as a PNG file.
-    pub(super) fn picture(&mut self, file: String, picture: &gpbrdf_core::Picture) -> Result<()> {
+    pub(super) fn picture(&mut self, file: String, picture: &Picture) -> Result<()> {
         let mut bytes = Vec::new();
         picture.write_png(&mut bytes).with_context(|| format!("cannot draw \"{file}\""))?;
         self.figures.push((file, bytes));
@@ -91,7 +94,7 @@ impl<'a> Material<'a> {
     /// # Errors
     /// If the source is scattered samples.
     pub(super) fn truth(&self) -> Result<Cow<'a, BrdfTable>> {
-        self.source.table().with_context(|| self.shapeless())
+        Ok(self.source.table()?)
     }
 
     /// Measures the source on the default lattice of about `count` nodes.
@@ -110,13 +113,8 @@ impl<'a> Material<'a> {
         &self,
         layout: impl FnOnce(Symmetry) -> Result<LatticeLayout>,
     ) -> Result<SampleSet> {
-        let brdf = self.source.brdf().with_context(|| self.shapeless())?;
-        let lattice = layout(detect_symmetry(brdf))?;
-        Ok(SampleSet::measure(brdf, &Layout::Lattice(lattice))?)
-    }
-
-    fn shapeless(&self) -> String {
-        format!("{}: expected a table or a BRDF that can be asked anywhere, found samples", self.name())
+        let lattice = layout(detect_symmetry(self.source.brdf()?))?;
+        Ok(self.source.measure(&Layout::Lattice(lattice))?)
     }
 }
 
@@ -192,7 +190,7 @@ impl Context {
         interval: bool,
     ) -> Result<Fitted> {
         let start = Instant::now();
-        let (model, _) = fit(samples, options, Provenance::default())?;
+        let model = fit(samples, options)?.model;
         self.compare(truth, model, start.elapsed().as_secs_f64(), interval)
     }
 
@@ -205,7 +203,7 @@ impl Context {
         interval: bool,
     ) -> Result<Fitted> {
         let mean = bake_mean(&model);
-        let sigma = interval.then(|| bake_sigma(&model));
+        let sigma = interval.then(|| bake_sigma(&model)).transpose()?;
         let metrics = judge(truth, &model, &mean, sigma.as_ref(), &self.environment)?;
         Ok(Fitted { model, mean, metrics, fit_seconds })
     }
@@ -224,7 +222,7 @@ pub(crate) fn measurements(folder: &Path, observer: &dyn Observer) -> Result<Vec
     for file in files {
         let extension = file.extension().map(|e| e.to_ascii_lowercase());
         let merl = extension.as_deref().is_some_and(|e| e == "binary");
-        if merl && gpbrdf_core::merl_material_name(&gpbrdf_core::sha256_file(&file)?).is_none() {
+        if merl && merl_material_name(&sha256_file(&file)?).is_none() {
             observer.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
             continue;
         }

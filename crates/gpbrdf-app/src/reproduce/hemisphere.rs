@@ -3,10 +3,11 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use anyhow::Result;
-use gpbrdf_core::{
-    AxisMetric, Brdf, Noise, OptimizeOptions, Panel, Picture, Shape, direction, fit_dense, material,
-    panel_figure,
-};
+use gpbrdf_core::brdf::{direction, material};
+use gpbrdf_core::figure::{Panel, Picture, panel_figure};
+use gpbrdf_core::gp::{DenseFit, OptimizeOptions};
+use gpbrdf_core::kernel::AxisMetric;
+use gpbrdf_core::{Brdf, Noise, Shape};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
@@ -114,9 +115,15 @@ fn fit_model(model: &str, count: usize) -> Result<Prediction> {
         samples.iter().map(|&view| Ok((value(model, view)? + EPSILON).ln())).collect::<Result<Vec<_>>>()?;
     let mean = y.iter().sum::<f64>() / y.len() as f64;
     let y: Vec<f64> = y.iter().map(|y| y - mean).collect();
-    let shapes = [Shape::RationalQuadratic { alpha: 2.0 }];
-    let options = OptimizeOptions { max_iterations: 60, ..OptimizeOptions::default() };
-    let (gp, _) = fit_dense(&x, &[y], &[AxisMetric::Linear; 2], &shapes, Noise::Optimized, &options)?;
+    let search = DenseFit {
+        x: &x,
+        targets: &[y],
+        metrics: &[AxisMetric::Linear; 2],
+        shapes: &[Shape::RationalQuadratic { alpha: 2.0 }],
+        noise: Noise::Optimized,
+        options: &OptimizeOptions { max_iterations: 60, ..OptimizeOptions::default() },
+    };
+    let (gp, _) = search.run(&|| Ok(()))?;
     let predict = move |views: &[View]| -> Result<Vec<f64>> {
         let x: Vec<f64> = views.iter().flat_map(|&view| coordinates(view)).collect();
         Ok(gp.predict_mean(&x)?.into_iter().map(|g| ((g + mean).exp() - EPSILON).max(0.0)).collect())

@@ -45,10 +45,9 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
     let many = material.lattice_samples(PAPER_SAMPLES)?;
     for (setting, samples) in [("dense", few), ("lattice", many)] {
         for (kernel, shapes, paper) in KERNELS {
-            let kernels = shapes.to_vec();
-            let options = match samples.lattice {
-                None => paper_options(kernels),
-                Some(_) => FitOptions { kernel: kernels, ..FitOptions::default() },
+            let options = match samples.lattice() {
+                None => paper_options(shapes),
+                Some(_) => FitOptions::default().with_kernel(shapes),
             };
             let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
             let mut row = vec![json!(kernel), json!(setting), json!(samples.angles.len())];

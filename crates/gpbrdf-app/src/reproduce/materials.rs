@@ -38,7 +38,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             table.rows.push(row);
         }
         let truth = material.truth()?;
-        let theirs = paper_options(vec![Shape::RationalQuadratic { alpha: 1.0 }]);
+        let theirs = paper_options(&[Shape::RationalQuadratic { alpha: 1.0 }]);
         let settings = [
             ("the paper's, thinned", paper_samples(&truth, most), theirs),
             ("ours", material.lattice_samples(PAPER_SAMPLES)?, FitOptions::default()),

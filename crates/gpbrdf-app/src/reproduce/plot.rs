@@ -7,7 +7,7 @@ use plotters::prelude::{
 };
 use plotters::style::Color;
 
-use crate::job::significant;
+use gpbrdf_core::base::number::short;
 
 /// Named points, joined by a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,12 +38,7 @@ impl Axis<'_> {
             let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
             return format!("{rounded}");
         }
-        let digits = significant(if at.abs() < 1e-12 { 0.0 } else { at });
-        if digits.contains('.') && !digits.contains('e') {
-            digits.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            digits
-        }
+        short(if at.abs() < 1e-12 { 0.0 } else { at }, 4)
     }
 }
 

@@ -1,7 +1,8 @@
 //! Figure 2: error and time of the fit against the sampling rate.
 
 use anyhow::Result;
-use gpbrdf_core::{FitOptions, Layout, N_CELLS, SampleSet, Solver};
+use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::{FitOptions, Layout, SampleSet, Solver};
 use serde_json::json;
 
 use super::context::{Context, Outcome};

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::job::significant;
+use gpbrdf_core::base::number::significant;
 
 /// Rows of names and numbers under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -105,7 +105,7 @@ fn shown(value: &Value) -> String {
         Value::Null => String::new(),
         Value::String(text) => text.clone(),
         Value::Number(n) if n.is_u64() => n.to_string(),
-        Value::Number(n) => n.as_f64().map_or_else(String::new, significant),
+        Value::Number(n) => n.as_f64().map_or_else(String::new, |x| significant(x, 4)),
         other => other.to_string(),
     }
 }

@@ -7,7 +7,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Args, value_parser};
-use gpbrdf_core::{AtomicFile, BrdfTable, Content, PixelDifference, Source, exposure_of, psnr, ssim};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::base::number::significant;
+use gpbrdf_core::judge::{PixelDifference, exposure_of, psnr, ssim};
+use gpbrdf_core::{BrdfTable, Content, Source};
 use gpbrdf_render::{
     AdapterChoice, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
     Projection, Renderer, ShadingOptions, read_obj,
@@ -17,7 +20,7 @@ use serde_json::{Value, json};
 use super::input::{environment, open};
 use super::parse::{Exposure, parse_exposure, parse_pair, parse_positive, parse_size, parse_vector};
 use super::terminal::Terminal;
-use crate::job::{Backend, Baked, Baking, Job, ModelSpec, Observer, Run, Stage, significant};
+use crate::job::{Backend, Baked, Baking, Job, ModelSpec, Observer, Run, Stage};
 use choices::{BackgroundName, LightName, SamplingName, ShowName, ToneName};
 use pictures::Pictures;
 
@@ -219,7 +222,7 @@ impl Render {
             return terminal.print(&format!("{}\n", serde_json::to_string_pretty(report)?));
         }
         if let (Some(psnr), Some(ssim)) = (report["psnr"].as_f64(), report["ssim"].as_f64()) {
-            terminal.summary(&format!("PSNR {} dB, SSIM {}", significant(psnr), significant(ssim)))?;
+            terminal.summary(&format!("PSNR {} dB, SSIM {}", significant(psnr, 4), significant(ssim, 4)))?;
         }
         for path in &self.output {
             terminal.summary(&format!("wrote {}", path.display()))?;
@@ -276,7 +279,7 @@ impl Render {
             ShowName::Difference => (true, true),
         };
         let truth = match source.table() {
-            Some(table) if needs_truth && !is_model => Some(table.into_owned()),
+            Ok(table) if needs_truth && !is_model => Some(table.into_owned()),
             _ if needs_truth => {
                 bail!("{}: expected a source with a truth to compare with, found none", source.origin())
             }

@@ -3,9 +3,9 @@
 use std::io::Write;
 
 use anyhow::Result;
-use gpbrdf_core::{
-    AtomicFile, Colormap, Panel, Picture, Scale, panel_figure, round_limit, write_image_exr, write_rgba_png,
-};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, panel_figure, round_limit, write_rgba_png};
+use gpbrdf_core::formats::write_image_exr;
 use gpbrdf_render::{Background, Display, LinearPicture, Renderer};
 
 use super::choices::ShowName;
