@@ -29,13 +29,18 @@
 //!   is itself a [`Brdf`], and is saved and loaded bit for bit; [`Baked`] fills all 1,458,000 cells.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
+//! The features `formats` and `figures` are on by default; without them a program that loads and evaluates models builds
+//! without readers of files, pictures and fonts.
+//!
 //! Results do not depend on the number of threads. The paper is Hao, Liu and Weng, "A BRDF Representing Method Based on
 //! Gaussian Process"; equation numbers without another source are its.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests state exact expectations"))]
 
 pub mod base;
 pub mod brdf;
+#[cfg(feature = "figures")]
 pub mod figure;
+#[cfg(feature = "formats")]
 pub mod formats;
 pub mod gp;
 pub mod judge;
@@ -50,6 +55,7 @@ pub use nalgebra;
 
 pub use base::{Error, Result};
 pub use brdf::{Brdf, BrdfTable, HalfDiff, Rgb, SigmaTable};
+#[cfg(feature = "formats")]
 pub use formats::{Content, Source};
 pub use gp::{FitReport, Hyper, Noise, Observer, Solver};
 pub use judge::{Environment, Metrics};

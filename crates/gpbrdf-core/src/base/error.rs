@@ -35,7 +35,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// The kinds that can be read.
-        expected: &'static str,
+        expected: String,
         /// A description of the content.
         found: String,
     },

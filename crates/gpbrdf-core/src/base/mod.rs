@@ -3,6 +3,7 @@
 pub(crate) mod atomic_file;
 pub(crate) mod error;
 pub(crate) mod f16;
+pub mod number;
 pub(crate) mod random;
 pub(crate) mod simd;
 

@@ -1,12 +1,14 @@
 //! Figures: truth, prediction and difference side by side, with captions, axes and scales.
 
 use crate::base::error::Result;
+use crate::base::number::short;
 use crate::brdf::{Brdf, Rgb};
 use crate::figure::colormap::Colormap;
 use crate::figure::picture::{Picture, Rgb8, tone_map};
+use crate::figure::scale::round_limit;
 use crate::figure::slice::{Slice, SliceOptions};
 use crate::judge::Image;
-use crate::judge::image_metrics::{exposure_of, percentile, psnr};
+use crate::judge::image_metrics::{exposed_difference, exposure_of, psnr};
 
 const BACKGROUND: Rgb8 = [34, 34, 38];
 const INK: Rgb8 = [226, 226, 230];
@@ -54,12 +56,10 @@ struct Axes {
     square_theta_h: bool,
 }
 
-/// A figure of image slices: truth, prediction and their difference; without a truth, the prediction and, where
-/// there is one, sigma.
+/// A figure of image slices: truth, prediction and their difference; without a truth, the prediction alone.
 ///
-/// The difference is [`Slice::log_difference`]; its scale is symmetric and ends at a round number at or above the
-/// 99th percentile of the absolute difference. `sigma`, in sr^-1, is shown as its mean over R, G and B, on the
-/// same kind of scale from 0.
+/// The difference is [`Slice::log_difference`], red where the prediction is too bright; its scale is symmetric and ends at
+/// [`round_limit`].
 ///
 /// # Errors
 /// Those of [`Slice::log_difference`]; slices taken with the same options give none.
@@ -67,7 +67,6 @@ pub fn slice_figure(
     title: &str,
     truth: Option<&dyn Brdf>,
     prediction: &dyn Brdf,
-    sigma: Option<&dyn Brdf>,
     options: &SliceOptions,
 ) -> Result<Picture> {
     let predicted = Slice::new(prediction, options);
@@ -84,30 +83,21 @@ pub fn slice_figure(
         note.push_str("difference: ln(prediction + 0.001) - ln(truth + 0.001), mean of R, G, B");
     } else {
         panels.push(Panel::plain("prediction", predicted.tone_mapped(options)));
-        if let Some(sigma) = sigma {
-            let slice = Slice::new(sigma, options);
-            let values: Vec<f64> = slice.values().iter().map(mean).collect();
-            let limit = round_limit(&values, slice.above_horizon());
-            let colours = slice.picture(|i| Colormap::Sequential.at(values[i] / limit));
-            panels.push(Panel::magnitude("sigma", colours, limit));
-            note.push_str("sigma: 1/sr, mean of R, G, B");
-        }
     }
     let degrees = options.phi_d.to_degrees();
-    let mut shown = format!("\u{3c6}_d {}\u{b0}", short(degrees));
+    let mut shown = format!("\u{3c6}_d {}\u{b0}", short(degrees, 3));
     if options.exposure != 0.0 {
         let sign = if options.exposure > 0.0 { "+" } else { "" };
-        shown.push_str(&format!("   exposure {sign}{}", short(options.exposure)));
+        shown.push_str(&format!("   exposure {sign}{}", short(options.exposure, 3)));
     }
     let axes = Axes { square_theta_h: options.square_theta_h };
     Ok(compose(&join(title, &shown), &panels, Some(&axes), &note))
 }
 
-/// A figure of sphere pictures: truth, prediction and their difference; without a truth, the prediction and, where
-/// there is one, sigma. All have the exposure of [`exposure_of`] the first and a gamma of 2.2.
+/// A figure of sphere pictures: truth, prediction and their difference; without a truth, the prediction alone. All have
+/// the exposure of [`exposure_of`] the first and a gamma of 2.2.
 ///
-/// The difference is that of exposed linear values before clipping, averaged over R, G and B, so that 1 is the
-/// white of the picture; the title shows the PSNR of `psnr_env`, or of the pictures themselves without it.
+/// The difference is [`exposed_difference`], red where the prediction is too bright; the title shows the PSNR of `psnr_env`, or of the pictures themselves without it.
 ///
 /// # Errors
 /// [`crate::Error::InvalidArgument`] when the pictures differ in size.
@@ -115,7 +105,6 @@ pub fn sphere_figure(
     title: &str,
     truth: Option<&Image>,
     prediction: &Image,
-    sigma: Option<&Image>,
     psnr_env: Option<f64>,
 ) -> Result<Picture> {
     let exposure = exposure_of(truth.unwrap_or(prediction));
@@ -125,8 +114,8 @@ pub fn sphere_figure(
     if let Some(truth) = truth {
         let found = psnr(truth, prediction, exposure)?;
         shown = format!("PSNR {:.1} dB", psnr_env.unwrap_or(found));
-        let pairs = truth.pixels().iter().zip(prediction.pixels());
-        let gap: Vec<f64> = pairs.map(|(a, b)| exposure * (mean(&wide(b)) - mean(&wide(a)))).collect();
+        let pairs = prediction.pixels().iter().zip(truth.pixels());
+        let gap: Vec<f64> = pairs.map(|(a, b)| exposed_difference(wide(a), wide(b), exposure)).collect();
         let limit = round_limit(&gap, truth.mask());
         let colours = disc_by_index(truth, |i| Colormap::Diverging.at(0.5 + 0.5 * gap[i] / limit));
         panels.push(Panel::plain("truth", show(truth)));
@@ -135,13 +124,6 @@ pub fn sphere_figure(
         note.push_str("difference: prediction - truth, linear, mean of R, G, B; 1 = white");
     } else {
         panels.push(Panel::plain("prediction", show(prediction)));
-        if let Some(sigma) = sigma {
-            let values: Vec<f64> = sigma.pixels().iter().map(|p| exposure * mean(&wide(p))).collect();
-            let limit = round_limit(&values, sigma.mask());
-            let colours = disc_by_index(sigma, |i| Colormap::Sequential.at(values[i] / limit));
-            panels.push(Panel::magnitude("sigma", colours, limit));
-            note.push_str("sigma: linear, mean of R, G, B; 1 = white");
-        }
     }
     Ok(compose(&join(title, &shown), &panels, None, &note))
 }
@@ -161,11 +143,6 @@ impl Panel {
         let scale = Scale { map: Colormap::Diverging, low: -limit, high: limit };
         Self { picture, caption, scale: Some(scale) }
     }
-
-    fn magnitude(caption: &'static str, picture: Picture, limit: f64) -> Self {
-        let scale = Scale { map: Colormap::Sequential, low: 0.0, high: limit };
-        Self { picture, caption, scale: Some(scale) }
-    }
 }
 
 impl Scale {
@@ -173,7 +150,7 @@ impl Scale {
     fn labels(&self) -> [String; 5] {
         std::array::from_fn(|i| {
             let value = self.high + (self.low - self.high) * i as f64 / 4.0;
-            if self.low < 0.0 && value > 0.0 { format!("+{}", short(value)) } else { short(value) }
+            if self.low < 0.0 && value > 0.0 { format!("+{}", short(value, 3)) } else { short(value, 3) }
         })
     }
 
@@ -317,43 +294,11 @@ fn disc_by_index(image: &Image, colour: impl Fn(usize) -> Rgb8) -> Picture {
     })
 }
 
-/// The end of a colour scale: 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in
-/// `mask`; at least 1e-6.
-#[must_use]
-pub fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
-    let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());
-    let mut sizes: Vec<f64> = finite.map(|(x, _)| x.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let level = percentile(&sizes, 0.99).max(1e-6);
-    let power = 10.0f64.powf(level.log10().floor());
-    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= level * (1.0 - 1e-9)).unwrap_or(10.0);
-    step * power
-}
-
-/// A number with at most three digits that count, without trailing zeros.
-fn short(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-4..1e5).contains(&value.abs()) {
-        return format!("{value:.2e}").replace(".00e", "e").replace("0e", "e");
-    }
-    let size = value.abs().log10().floor();
-    let decimals = (2.0 - size).clamp(0.0, 6.0);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within [0, 6]")]
-    let text = format!("{value:.*}", decimals as usize);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
 fn join(title: &str, shown: &str) -> String {
     match (title.is_empty(), shown.is_empty()) {
         (false, false) => format!("{title}   {shown}"),
         _ => format!("{title}{shown}"),
     }
-}
-
-fn mean(rgb: &Rgb) -> f64 {
-    (rgb[0] + rgb[1] + rgb[2]) / 3.0
 }
 
 fn wide(pixel: &[f32; 3]) -> Rgb {
@@ -384,16 +329,15 @@ mod tests {
     fn nothing_is_drawn_on_the_margin_and_the_panels_are_inside() {
         let (truth, prediction) = (BrdfTable::from_fn(glossy), BrdfTable::from_fn(rippled));
         let options = SliceOptions { size: 128, ..SliceOptions::default() };
-        let slices = slice_figure("chm_mint", Some(&truth), &prediction, None, &options).unwrap();
+        let slices = slice_figure("chm_mint", Some(&truth), &prediction, &options).unwrap();
         let images = render_env(&[&truth, &prediction], &Environment::studio(), 64);
         let spheres = sphere_figure(
             "a title longer than it should be, by far, for three panels this small",
             Some(&images[0]),
             &images[1],
             None,
-            None,
         );
-        let alone = sphere_figure("", None, &images[1], None, None).unwrap();
+        let alone = sphere_figure("", None, &images[1], None).unwrap();
         for figure in [slices, spheres.unwrap(), alone] {
             let (width, height) = (figure.width(), figure.height());
             for (i, colour) in figure.pixels().iter().enumerate() {
@@ -414,30 +358,7 @@ mod tests {
         assert!((limit(0.021) - 0.05).abs() < 1e-12);
         assert!((limit(7.0) - 10.0).abs() < 1e-12);
         assert_eq!(limit(0.0), 1e-6);
-        let texts = [0.05, -0.025, 0.0, 90.0, 1e-6, 2.5e-6, 1.5].map(short);
+        let texts = [0.05, -0.025, 0.0, 90.0, 1e-6, 2.5e-6, 1.5].map(|x| short(x, 3));
         assert_eq!(texts, ["0.05", "-0.025", "0", "90", "1e-6", "2.5e-6", "1.5"]);
-    }
-
-    /// Writes every kind of figure into the folder named by `GPBRDF_FIGURES`, to be looked at.
-    #[test]
-    #[ignore = "writes pictures for people to look at"]
-    fn figures_for_the_eye() {
-        let folder = std::env::var_os("GPBRDF_FIGURES").map_or_else(std::env::temp_dir, Into::into);
-        let (truth, prediction) = (BrdfTable::from_fn(glossy), BrdfTable::from_fn(rippled));
-        let sigma = BrdfTable::from_fn(|a| glossy(a).map(|x| 0.01 + 0.02 * x * a.theta_d));
-        let options = SliceOptions::default();
-        let square = SliceOptions { square_theta_h: true, exposure: -1.0, phi_d: 0.6, ..options };
-        let save = |name: &str, picture: &Picture| picture.save_png(&folder.join(name)).unwrap();
-        save("slice.png", &slice_figure("glossy red", Some(&truth), &prediction, None, &options).unwrap());
-        save("slice_square.png", &slice_figure("", Some(&truth), &prediction, None, &square).unwrap());
-        save(
-            "slice_sigma.png",
-            &slice_figure("glossy red", None, &prediction, Some(&sigma), &options).unwrap(),
-        );
-        save("slice_alone.png", &slice_figure("glossy red", None, &prediction, None, &options).unwrap());
-        let images = render_env(&[&truth, &prediction, &sigma], &Environment::studio(), 256);
-        let (a, b, c) = (&images[0], &images[1], &images[2]);
-        save("sphere.png", &sphere_figure("glossy red", Some(a), b, None, None).unwrap());
-        save("sphere_sigma.png", &sphere_figure("glossy red", None, b, Some(c), None).unwrap());
     }
 }

@@ -6,6 +6,7 @@ use crate::base::error::{Error, Result};
 use crate::brdf::angles::{HalfDiff, fold_phi_d};
 use crate::brdf::{Brdf, Rgb};
 use crate::figure::picture::{Picture, Rgb8, tone_map};
+use crate::sample::log_value;
 
 /// What stands where a direction is below the horizon.
 const BELOW_HORIZON: Rgb8 = [58, 58, 64];
@@ -103,8 +104,7 @@ impl Slice {
             let expected = format!("{0} x {0} pixels like the truth", truth.size);
             return Err(Error::argument("predicted slice", expected, format!("{0} x {0}", self.size)));
         }
-        let log = |x: f64| (x.max(0.0) + 1e-3).ln();
-        let gap = |a: &Rgb, b: &Rgb| (0..3).map(|c| log(a[c]) - log(b[c])).sum::<f64>() / 3.0;
+        let gap = |a: &Rgb, b: &Rgb| (0..3).map(|c| log_value(a[c]) - log_value(b[c])).sum::<f64>() / 3.0;
         Ok(self.values.iter().zip(&truth.values).map(|(a, b)| gap(a, b)).collect())
     }
 }

@@ -7,19 +7,10 @@ use crate::base::error::{Error, Result};
 use crate::brdf::materials::material;
 use crate::brdf::table::BrdfTable;
 use crate::brdf::{Brdf, Reciprocal};
-use crate::formats::cornell::read_cornell;
-use crate::formats::merl::read_merl;
-use crate::formats::merl_names::merl_material_name;
-use crate::formats::rgl::read_rgl;
-use crate::formats::samples_csv::read_samples_csv;
-use crate::formats::table_exr::read_table_exr;
-use crate::formats::{FileKind, recognise, sha256_file};
+use crate::formats::{merl_material_name, recognise, sha256_file};
 use crate::model::Model;
 use crate::model::bake::bake_mean;
 use crate::sample::{Layout, Provenance, SampleSet};
-
-/// RGL measurements are extrapolated at grazing angles: asked at a cosine of at least this.
-const RGL_MIN_COSINE: f64 = 0.02;
 
 /// Analytic models are defined up to the horizon; this keeps cells at the horizon filled.
 const ANALYTIC_MIN_COSINE: f64 = 1e-3;
@@ -28,8 +19,13 @@ const ANALYTIC_MIN_COSINE: f64 = 1e-3;
 pub enum Content {
     /// A MERL or OpenEXR table.
     Table(BrdfTable),
-    /// A BRDF that can be asked at any directions: an RGL measurement or an analytic model.
-    Function(Box<dyn Brdf>),
+    /// A BRDF that can be evaluated at any directions: an RGL measurement or an analytic model.
+    Function {
+        /// The BRDF.
+        brdf: Box<dyn Brdf>,
+        /// What the source says about itself.
+        description: String,
+    },
     /// Scattered measurements.
     Samples(Box<SampleSet>),
     /// A fitted model.
@@ -40,7 +36,7 @@ impl std::fmt::Debug for Content {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Table(_) => "Table",
-            Self::Function(_) => "Function",
+            Self::Function { .. } => "Function",
             Self::Samples(_) => "Samples",
             Self::Model(_) => "Model",
         })
@@ -72,32 +68,24 @@ impl Source {
     /// A file that cannot be read, is of no known kind, or is damaged.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let kind = recognise(path)?;
-        let mut description = String::new();
-        let content = match kind {
-            FileKind::Merl => Content::Table(read_merl(path)?),
-            FileKind::TableExr => Content::Table(read_table_exr(path)?),
-            FileKind::Rgl => {
-                let inner = read_rgl(path)?;
-                inner.description().clone_into(&mut description);
-                Content::Function(Box::new(Reciprocal { inner, min_cosine: RGL_MIN_COSINE }))
-            }
-            FileKind::SamplesCsv => Content::Samples(Box::new(read_samples_csv(path)?)),
-            FileKind::Cornell => Content::Samples(Box::new(read_cornell(path)?)),
-            FileKind::Model => Content::Model(Box::new(Model::load(path)?)),
-        };
+        let format = recognise(path)?;
+        let content = (format.read)(path)?;
         let sha256 = sha256_file(path)?;
         let stem = || path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         let mut name = merl_material_name(&sha256).map_or_else(stem, str::to_owned);
-        if let Content::Model(model) = &content {
-            name.clone_from(&model.provenance.material);
-            description = format!("model of {}", model.provenance.source);
-        }
-        let mut source =
-            Self { name, description, kind: kind.to_string(), path: Some(path.to_owned()), sha256, content };
+        let description = match &content {
+            Content::Table(_) => String::new(),
+            Content::Function { description, .. } => description.clone(),
+            Content::Samples(samples) => samples.description.clone(),
+            Content::Model(model) => {
+                name.clone_from(&model.provenance.material);
+                format!("model of {}", model.provenance.source)
+            }
+        };
+        let kind = format.name.to_owned();
+        let mut source = Self { name, description, kind, path: Some(path.to_owned()), sha256, content };
         let origin = source.provenance();
         if let Content::Samples(samples) = &mut source.content {
-            source.description.clone_from(&samples.description);
             samples.origin = origin;
         }
         Ok(source)
@@ -109,16 +97,15 @@ impl Source {
     /// A name that none has.
     pub fn built_in(name: &str) -> Result<Self> {
         let found = material(name)?;
+        let description = format!("{}; {}", found.description, found.source);
+        let brdf = Box::new(Reciprocal { inner: found.brdf, min_cosine: ANALYTIC_MIN_COSINE });
         Ok(Self {
             name: found.name.to_owned(),
-            description: format!("{}; {}", found.description, found.source),
+            description: description.clone(),
             kind: "built-in material".to_owned(),
             path: None,
             sha256: String::new(),
-            content: Content::Function(Box::new(Reciprocal {
-                inner: found.brdf,
-                min_cosine: ANALYTIC_MIN_COSINE,
-            })),
+            content: Content::Function { brdf, description },
         })
     }
 
@@ -129,7 +116,7 @@ impl Source {
     pub fn brdf(&self) -> Result<&dyn Brdf> {
         match &self.content {
             Content::Table(table) => Ok(table),
-            Content::Function(brdf) => Ok(brdf.as_ref()),
+            Content::Function { brdf, .. } => Ok(brdf.as_ref()),
             Content::Model(model) => Ok(model.as_ref()),
             Content::Samples(_) => Err(self.scattered()),
         }
@@ -142,7 +129,7 @@ impl Source {
     pub fn table(&self) -> Result<Cow<'_, BrdfTable>> {
         match &self.content {
             Content::Table(table) => Ok(Cow::Borrowed(table)),
-            Content::Function(brdf) => Ok(Cow::Owned(BrdfTable::from_fn(|a| brdf.eval_half_diff(a)))),
+            Content::Function { brdf, .. } => Ok(Cow::Owned(BrdfTable::from_fn(|a| brdf.eval_half_diff(a)))),
             Content::Model(model) => Ok(Cow::Owned(bake_mean(model))),
             Content::Samples(_) => Err(self.scattered()),
         }

@@ -5,16 +5,11 @@
 //! middle of the map looks along `-z`, its right quarter along `+x`, its edges along `+z`.
 
 use std::f64::consts::{PI, TAU};
-use std::io::Cursor;
-use std::path::Path;
 
 use nalgebra::Vector3;
 
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
-
-/// The most pixels that [`Environment::read`] takes: 3.2 GB.
-const MAX_PIXELS: usize = 1 << 28;
 
 /// A latitude-longitude map of radiance, linear RGB, rows from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,43 +82,6 @@ impl Environment {
             })
             .collect();
         Self { width, height, pixels }
-    }
-
-    /// Reads a Radiance `.hdr` or an `OpenEXR` file (first layer with R, G and B), told apart by content.
-    /// Negative values become 0.
-    ///
-    /// # Errors
-    /// [`Error::Io`] when the file cannot be read, [`Error::UnknownFormat`] when it is of neither kind,
-    /// [`Error::Format`] when it is broken, over 2^28 pixels, or holds a value that is not finite.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
-        let (format, decoded) = if bytes.starts_with(b"#?") {
-            ("Radiance HDR", decode_hdr(&bytes))
-        } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-            ("OpenEXR", decode_exr(&bytes))
-        } else {
-            let shown: String = bytes.iter().take(4).map(|b| format!("{b:02x} ")).collect();
-            return Err(Error::UnknownFormat {
-                path: path.to_owned(),
-                expected: "a Radiance HDR or OpenEXR environment map",
-                found: format!("{} bytes starting with [{}]", bytes.len(), shown.trim_end()),
-            });
-        };
-        let broken = |expected: &str, found: String| Error::Format {
-            format,
-            path: path.to_owned(),
-            expected: expected.to_owned(),
-            found,
-        };
-        let (width, height, mut pixels) =
-            decoded.map_err(|found| broken("a latitude-longitude map in RGB", found))?;
-        for value in pixels.iter_mut().flatten() {
-            // Not `max`, which would make 0 of NaN.
-            if *value < 0.0 {
-                *value = 0.0;
-            }
-        }
-        Self::new(width, height, pixels).map_err(|error| broken("finite radiance", error.to_string()))
     }
 
     /// Number of columns.
@@ -222,44 +180,6 @@ fn overlaps(i: usize, target: usize, source: usize) -> Vec<(usize, f64, f64)> {
         .collect()
 }
 
-/// Width, height and pixels, or what is wrong.
-type Decoded = Result<(usize, usize, Vec<[f32; 3]>), String>;
-
-fn decode_hdr(bytes: &[u8]) -> Decoded {
-    let image = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Hdr)
-        .decode()
-        .map_err(|error| error.to_string())?
-        .into_rgb32f();
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    Ok((width, height, image.pixels().map(|p| p.0).collect()))
-}
-
-fn decode_exr(bytes: &[u8]) -> Decoded {
-    use exr::prelude::{ReadChannels as _, ReadLayers as _};
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
-        .map_err(|error| error.to_string())?;
-    for header in &meta.headers {
-        if header.layer_size.area() > MAX_PIXELS {
-            return Err(format!("{} x {} pixels", header.layer_size.width(), header.layer_size.height()));
-        }
-    }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| (size.width(), vec![[0.0f32; 3]; size.area()]),
-            |(width, pixels): &mut (usize, Vec<[f32; 3]>), at, (r, g, b): (f32, f32, f32)| {
-                pixels[at.y() * *width + at.x()] = [r, g, b];
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| error.to_string())?;
-    let size = image.layer_data.size;
-    Ok((size.width(), size.height(), image.layer_data.channel_data.pixels.1))
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of a map")]
 fn narrow(rgb: Rgb) -> [f32; 3] {
     rgb.map(|x| x as f32)
@@ -306,39 +226,5 @@ mod tests {
         assert!(brightest.radiance[0] > 40.0 && brightest.radiance[0] < 51.0, "{brightest:?}");
         let axis = Vector3::new(-0.55, 0.65, 0.60).normalize();
         assert!(brightest.direction.dot(&axis) > 0.99);
-    }
-
-    #[test]
-    fn files_of_both_kinds_are_read_back_and_others_are_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let pixels = [[1.0f32, 0.5, 0.25], [2.0, 4.0, 8.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.5]];
-        let hdr = folder.path().join("map.dat");
-        let rgb: Vec<_> = pixels.iter().map(|&p| image::Rgb(p)).collect();
-        let file = std::fs::File::create(&hdr).unwrap();
-        image::codecs::hdr::HdrEncoder::new(file).encode(&rgb, 2, 2).unwrap();
-        let map = Environment::read(&hdr).unwrap();
-        assert_eq!((map.width(), map.height()), (2, 2));
-        assert_eq!(map.pixels(), pixels);
-
-        let exr = folder.path().join("map.exr");
-        exr::prelude::write_rgb_file(&exr, 2, 2, |x, y| {
-            let [r, g, b] = pixels[2 * y + x];
-            (r, g, if x == 0 && y == 1 { -1.0 } else { b })
-        })
-        .unwrap();
-        assert_eq!(Environment::read(&exr).unwrap().pixels(), pixels);
-
-        let bytes = std::fs::read(&hdr).unwrap();
-        std::fs::write(&hdr, &bytes[..bytes.len() - 3]).unwrap();
-        assert!(matches!(Environment::read(&hdr), Err(Error::Format { .. })));
-        let bytes = std::fs::read(&exr).unwrap();
-        std::fs::write(&exr, &bytes[..bytes.len() / 2]).unwrap();
-        assert!(matches!(Environment::read(&exr), Err(Error::Format { .. })));
-        exr::prelude::write_rgb_file(&exr, 1, 1, |_, _| (f32::NAN, 0.0, 0.0)).unwrap();
-        assert!(matches!(Environment::read(&exr), Err(Error::Format { .. })));
-        std::fs::write(&hdr, b"P6 1 1").unwrap();
-        let message = Environment::read(&hdr).unwrap_err().to_string();
-        assert!(message.contains("6 bytes starting with [50 36 20 31]"), "{message}");
-        assert!(matches!(Environment::read(folder.path()), Err(Error::Io { .. })));
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::base::error::{Error, Result};
+use crate::brdf::Rgb;
 use crate::judge::Image;
 use crate::judge::ssim::mean_ssim;
 
@@ -84,6 +85,13 @@ impl PixelDifference {
             share_below_5_percent: values.iter().filter(|&&x| x < 0.05).count() as f64 / count,
         })
     }
+}
+
+/// The difference that pictures show: prediction minus truth, exposed linear values before clipping, averaged over R, G
+/// and B. 1 is the white of the picture; positive values, drawn red, are too bright.
+#[must_use]
+pub fn exposed_difference(prediction: Rgb, truth: Rgb, exposure: f64) -> f64 {
+    exposure * (0..3).map(|c| prediction[c] - truth[c]).sum::<f64>() / 3.0
 }
 
 /// The factor that brings the 90th percentile over the sphere's pixels and channels to 0.6 (linear interpolation

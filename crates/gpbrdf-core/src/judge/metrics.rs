@@ -11,9 +11,7 @@ use crate::brdf::table::{BrdfTable, N_PHI_D, N_THETA_D, N_THETA_H, cell_center, 
 use crate::judge::environment::Environment;
 use crate::judge::image_metrics::{ImageMetrics, decibel};
 use crate::judge::sphere::{SPHERE_SIZE, render_env, render_point};
-
-/// Added to `f` before logarithms, sr^-1.
-const LOG_EPSILON: f64 = 1e-3;
+use crate::sample::LOG_EPSILON;
 
 /// The 95 % interval of a cell: its lower and upper end in each channel, sr^-1.
 pub type Interval<'a> = dyn Fn(usize) -> ([f64; 3], [f64; 3]) + Sync + 'a;

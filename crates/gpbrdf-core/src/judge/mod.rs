@@ -9,7 +9,7 @@ mod ssim;
 
 pub use environment::{EnvDirection, Environment};
 pub use image::Image;
-pub use image_metrics::{ImageMetrics, PixelDifference, exposure_of, psnr, ssim};
+pub use image_metrics::{ImageMetrics, PixelDifference, exposed_difference, exposure_of, psnr, ssim};
 pub use metrics::{CellMetrics, Interval, Metrics};
 pub use sphere::{
     DistantLight, ENV_PATCHES, POINT_LIGHT, SPHERE_SIZE, ShadingFrame, environment_lights, render_env,

@@ -71,8 +71,8 @@ pub struct Kernel {
 }
 
 impl KernelTerm {
-    /// A name that tells a shape of the joint distance from a product: `matern_5_2_ard`,
-    /// `product(rational_quadratic, matern_1_2 + matern_5_2)`.
+    /// A name that tells a shape of the joint distance from a product: `matern52_ard`,
+    /// `product(rq, matern12 + matern52)`.
     #[must_use]
     pub fn name(&self) -> String {
         match &self.body {
@@ -424,8 +424,8 @@ pub(crate) mod tests {
         assert!((ard.value(&x, &y) - product.value(&x, &y)).abs() < 1e-15);
         let (ard, product) = pair(Shape::RationalQuadratic { alpha: 0.8 });
         assert!((ard.value(&x, &y) - product.value(&x, &y)).abs() > 0.01);
-        assert_eq!(ard.name(), "rational_quadratic_ard");
-        assert_eq!(product.name(), "product(rational_quadratic, rational_quadratic)");
+        assert_eq!(ard.name(), "rq_ard");
+        assert_eq!(product.name(), "product(rq, rq)");
     }
 
     #[test]

@@ -16,20 +16,22 @@ use crate::base::error::{Error, Result};
 #[non_exhaustive]
 pub enum Shape {
     /// `exp(-r^2 / 2)`.
+    #[serde(rename = "se")]
     SquaredExponential,
     /// `(1 + r^2 / (2 alpha))^-alpha`: a scale mixture of squared exponentials.
+    #[serde(rename = "rq")]
     RationalQuadratic {
         /// Mixture parameter, positive; the squared exponential is its limit at infinity.
         alpha: f64,
     },
     /// `exp(-r)`: continuous paths.
-    #[serde(rename = "matern_1_2")]
+    #[serde(rename = "matern12")]
     Matern12,
     /// `(1 + sqrt(3) r) exp(-sqrt(3) r)`: once differentiable paths.
-    #[serde(rename = "matern_3_2")]
+    #[serde(rename = "matern32")]
     Matern32,
     /// `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: twice differentiable paths.
-    #[serde(rename = "matern_5_2")]
+    #[serde(rename = "matern52")]
     Matern52,
     /// `2^(1 - nu) / Gamma(nu) (sqrt(2 nu) r)^nu K_nu(sqrt(2 nu) r)`, with the modified Bessel function of the
     /// second kind. About a hundred times slower than the closed forms.
@@ -137,17 +139,50 @@ impl Shape {
         }
     }
 
-    /// The name in files and on the command line.
+    /// Every shape, with the parameters that it has where none are given: an alpha of 1, a nu of 3/2.
+    pub const ALL: [Self; 6] = [
+        Self::SquaredExponential,
+        Self::RationalQuadratic { alpha: 1.0 },
+        Self::Matern12,
+        Self::Matern32,
+        Self::Matern52,
+        Self::Matern { nu: 1.5 },
+    ];
+
+    /// The name in files, reports and on the command line, and the one on screens.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::SquaredExponential => ("se", "Squared exponential"),
+            Self::RationalQuadratic { .. } => ("rq", "Rational quadratic"),
+            Self::Matern12 => ("matern12", "Mat\u{e9}rn 1/2"),
+            Self::Matern32 => ("matern32", "Mat\u{e9}rn 3/2"),
+            Self::Matern52 => ("matern52", "Mat\u{e9}rn 5/2"),
+            Self::Matern { .. } => ("matern", "Mat\u{e9}rn"),
+        }
+    }
+
+    /// The name in files, in reports and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::SquaredExponential => "squared_exponential",
-            Self::RationalQuadratic { .. } => "rational_quadratic",
-            Self::Matern12 => "matern_1_2",
-            Self::Matern32 => "matern_3_2",
-            Self::Matern52 => "matern_5_2",
-            Self::Matern { .. } => "matern",
-        }
+        self.names().0
+    }
+
+    /// The name on screens.
+    #[must_use]
+    pub fn label(self) -> &'static str {
+        self.names().1
+    }
+
+    /// The shape of this [`Shape::name`], with the parameters of [`Shape::ALL`].
+    ///
+    /// # Errors
+    /// [`Error::UnknownName`] for a name that no shape has.
+    pub fn from_name(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|shape| shape.name() == name).ok_or_else(|| Error::UnknownName {
+            kind: "kernel shape",
+            name: name.to_owned(),
+            known: Self::ALL.map(Self::name).join(", "),
+        })
     }
 
     /// Whether the shape has the mixture parameter alpha.

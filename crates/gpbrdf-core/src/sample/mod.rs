@@ -14,4 +14,4 @@ pub use origin::{Provenance, SampleLayout};
 pub use set::{Sample, SampleSet};
 pub use space::{InputSpace, WarpedBox};
 pub use symmetry::{Symmetry, detect_symmetry};
-pub use target::{MeanFunction, Transform};
+pub use target::{LOG_EPSILON, MeanFunction, Transform, log_value};

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::Brdf;
 use crate::brdf::angles::BoxPoint;
 use crate::sample::lattice::LatticeLayout;
-use crate::sample::target::Transform;
+use crate::sample::target::log_value;
 
 /// The symmetry of `f` in `phi_d` that a layout and a model rely on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,9 +47,7 @@ pub fn detect_symmetry(brdf: &dyn Brdf) -> Symmetry {
         for (&u, &v) in u.iter().flat_map(|u| v.iter().map(move |v| (u, v))) {
             let side = |phi| brdf.eval_half_diff(BoxPoint { u, v, phi }.to_half_diff());
             let (a, b) = (side(phi), side(std::f64::consts::PI - phi));
-            let target = Transform::default();
-            sum +=
-                a.iter().zip(b).map(|(&a, b)| (target.forward(a) - target.forward(b)).powi(2)).sum::<f64>();
+            sum += a.iter().zip(b).map(|(&a, b)| (log_value(a) - log_value(b)).powi(2)).sum::<f64>();
         }
     }
     let count = 3 * lattice.len();

@@ -21,9 +21,18 @@ pub enum Transform {
     CubeRoot,
 }
 
+/// The epsilon of logarithms of BRDF values, sr^-1: of the default transform, of metrics and of pictures.
+pub const LOG_EPSILON: f64 = 1e-3;
+
+/// `ln(max(f, 0) + 1e-3)`: the scale on which errors are relative, for values above [`LOG_EPSILON`].
+#[must_use]
+pub fn log_value(f: f64) -> f64 {
+    (f.max(0.0) + LOG_EPSILON).ln()
+}
+
 impl Default for Transform {
     fn default() -> Self {
-        Self::Log { epsilon: 1e-3 }
+        Self::Log { epsilon: LOG_EPSILON }
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::base::error::{Error, Result};
 use crate::brdf::analytic::{NEURAL_FLOATS, NeuralBrdf};
-use crate::formats::read_bytes;
+use crate::formats::read::read_bytes;
 
 const FORMAT: &str = "Neural BRDF";
 

@@ -13,16 +13,43 @@
 //! All maps are bilinear on grids over the unit square and linear in `theta_i` between slices. The database's
 //! evaluator returns `f cos(theta_o)`; the cosine is divided out here.
 
+mod tensor_file;
+
+use crate::formats::format::Format;
+use crate::formats::source::Content;
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::path::Path;
 
 use nalgebra::Vector3;
 
 use crate::base::error::Result;
+use crate::brdf::Reciprocal;
 use crate::brdf::angles::HORIZON_COSINE;
 use crate::brdf::{Brdf, Rgb};
-use crate::formats::read_bytes;
-use crate::formats::tensor_file::{TensorFile, U8};
+use crate::formats::read::read_bytes;
+use crate::formats::rgl::tensor_file::{TensorFile, U8};
+
+/// Bytes at the start of a RGL file.
+const MAGIC: &[u8] = b"tensor_file\0";
+
+/// At grazing angles the measurements are extrapolated, so they are evaluated at a cosine of at least this.
+const MIN_MEASURED_COSINE: f64 = 0.02;
+
+/// The measurement as a reciprocal BRDF up to the horizon.
+fn read_reciprocal(path: &Path) -> Result<Content> {
+    let inner = read_rgl(path)?;
+    let description = inner.description().to_owned();
+    let brdf = Box::new(Reciprocal { inner, min_cosine: MIN_MEASURED_COSINE });
+    Ok(Content::Function { brdf, description })
+}
+
+/// A measurement of the RGL database.
+pub(crate) const FORMAT: Format = Format {
+    name: "RGL measurement",
+    file: "RGL .bsdf",
+    recognises: |head| head.bytes.starts_with(MAGIC),
+    read: read_reciprocal,
+};
 
 /// Larger than every file of the database, spectral and anisotropic ones included.
 const LIMIT_BYTES: u64 = 1 << 30;
@@ -327,7 +354,7 @@ mod tests {
     use super::*;
     use crate::brdf::angles::direction;
     use crate::formats::mutate::{Random, mutations};
-    use crate::formats::tensor_file::F32;
+    use crate::formats::rgl::tensor_file::F32;
     use crate::test_data::data_dir;
 
     /// A small file: constant maps, so that `f` is known.

@@ -5,13 +5,28 @@
 //! 1.66/1500 is `f` in sr^-1; negative means "no data". Source: W. Matusik et al., "A Data-Driven Reflectance
 //! Model" (2003), and the reader published with the database.
 
+mod names;
+
+pub use names::merl_material_name;
+
+use crate::formats::format::Format;
+use crate::formats::source::Content;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
-use crate::formats::{NotFinite, open};
+use crate::formats::format::Head;
+use crate::formats::read::{NotFinite, open};
+
+/// A table of the MERL database, or one of its shape.
+pub(crate) const FORMAT: Format = Format {
+    name: "MERL table",
+    file: "MERL .binary",
+    recognises: recognises,
+    read: |path| Ok(Content::Table(read_merl(path)?)),
+};
 
 /// Size of a MERL file in bytes: 34,992,012.
 pub const MERL_BYTES: u64 = 12 + 3 * 8 * N_CELLS as u64;
@@ -100,8 +115,22 @@ fn read(mut from: impl Read, length: Option<u64>, path: &Path) -> Result<BrdfTab
     BrdfTable::from_values(values)
 }
 
+/// Dimensions of a table at the start; or any binary content in a file with the name of one.
+fn recognises(head: &Head<'_>) -> bool {
+    let header = head.bytes.first_chunk::<12>();
+    header.is_some_and(|header| is_merl(dimensions(header), head.length))
+        || (head.text.is_none() && head.named_binary)
+}
+
+/// Whether three integers at the start of a file of `length` bytes are those of a MERL-like table.
+fn is_merl(dims: [i32; 3], length: u64) -> bool {
+    let [a, b, c] = dims.map(|d| u64::try_from(d).unwrap_or(0));
+    let plausible = [a, b, c].iter().all(|d| (1..=4096).contains(d));
+    dims == [90, 90, 180] || (plausible && length == 12 + 24 * a * b * c)
+}
+
 /// The three dimensions at the start of a MERL file.
-pub(crate) fn dimensions(header: &[u8; 12]) -> [i32; 3] {
+fn dimensions(header: &[u8; 12]) -> [i32; 3] {
     let (words, _) = header.as_chunks::<4>();
     std::array::from_fn(|k| i32::from_le_bytes(words[k]))
 }

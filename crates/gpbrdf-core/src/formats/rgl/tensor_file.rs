@@ -71,10 +71,10 @@ impl<'a> TensorFile<'a> {
         if bytes.is_empty() {
             return Err(file.wrong("a tensor file", "an empty file"));
         }
-        if !bytes.starts_with(super::TENSOR_FILE_MAGIC) {
+        if !bytes.starts_with(super::MAGIC) {
             return Err(file.wrong("\"tensor_file\" at the start", "something else"));
         }
-        let mut cursor = Cursor { bytes, at: super::TENSOR_FILE_MAGIC.len() };
+        let mut cursor = Cursor { bytes, at: super::MAGIC.len() };
         let cut = || file.wrong("a whole header", format!("{} bytes that end within it", bytes.len()));
         let version = cursor.array::<2>().ok_or_else(cut)?;
         if version != [1, 0] {

@@ -4,14 +4,28 @@
 //! `theta_i phi_i theta_s phi_s` in radians and `f` in sr^-1 at each wavelength. Source: the Light Measurement
 //! Laboratory of Cornell University's Program of Computer Graphics.
 
+mod spectrum;
+
+use crate::formats::format::Format;
+use crate::formats::source::Content;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::direction;
-use crate::formats::read_bytes;
-use crate::formats::spectrum::SpectrumToRgb;
+use crate::formats::cornell::spectrum::SpectrumToRgb;
+use crate::formats::read::read_bytes;
 use crate::sample::{Sample, SampleSet};
+
+/// Scattered spectra of the Cornell database.
+pub(crate) const FORMAT: Format = Format {
+    name: "Cornell measurement",
+    file: "Cornell .brdf",
+    recognises: |head| {
+        head.line.is_some_and(|line| line.split_whitespace().all(|token| token.parse::<f64>().is_ok()))
+    },
+    read: |path| Ok(Content::Samples(Box::new(read_cornell(path)?))),
+};
 
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 28;

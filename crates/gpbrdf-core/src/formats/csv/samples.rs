@@ -9,6 +9,8 @@
 //! An angle's unit is part of its name: `theta_i_deg` or `theta_i [deg]`, `theta_i_rad` or `theta_i [rad]`. A
 //! bare `theta_i` is in degrees. All angles of a file have the same unit.
 
+use crate::formats::format::Format;
+use crate::formats::source::Content;
 use std::f64::consts::FRAC_PI_2;
 use std::io::{self, Write};
 use std::path::Path;
@@ -19,8 +21,16 @@ use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 use crate::brdf::angles::{HalfDiff, direction, fold_phi_d};
-use crate::formats::read_bytes;
+use crate::formats::read::read_bytes;
 use crate::sample::{Sample, SampleSet};
+
+/// Measured samples or directions.
+pub(crate) const FORMAT: Format = Format {
+    name: "samples CSV",
+    file: "samples CSV",
+    recognises: |head| head.line.is_some_and(looks_like_samples),
+    read: |path| Ok(Content::Samples(Box::new(read_samples_csv(path)?))),
+};
 
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 30;
@@ -510,7 +520,7 @@ mod tests {
             assert_eq!(a.value, b.value);
             assert!((a.wi - b.wi).norm() < 1e-14 && (a.wo - b.wo).norm() < 1e-14);
         }
-        assert_eq!(crate::formats::recognise(&path).unwrap(), crate::formats::FileKind::SamplesCsv);
+        assert_eq!(crate::formats::recognise(&path).unwrap(), &FORMAT);
     }
 
     #[test]

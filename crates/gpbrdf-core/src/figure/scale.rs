@@ -1,0 +1,30 @@
+//! Where colour scales end.
+
+use crate::judge::image_metrics::percentile;
+
+/// The end of a colour scale: 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in
+/// `mask`; at least 1e-6.
+#[must_use]
+pub fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
+    let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());
+    let mut sizes: Vec<f64> = finite.map(|(x, _)| x.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let level = percentile(&sizes, 0.99).max(1e-6);
+    let power = 10.0f64.powf(level.log10().floor());
+    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= level * (1.0 - 1e-9)).unwrap_or(10.0);
+    step * power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_round_and_cover_the_values() {
+        let limit = |values: &[f64]| round_limit(values, &vec![true; values.len()]);
+        for (x, expected) in [(0.013, 0.02), (0.02, 0.02), (0.4, 0.5), (7.0, 10.0), (0.0, 1e-6)] {
+            assert!((limit(&[x]) / expected - 1.0).abs() < 1e-9, "{x}");
+        }
+        assert!(limit(&[]) > 0.0 && limit(&[f64::NAN, 0.4]) > 0.0);
+    }
+}

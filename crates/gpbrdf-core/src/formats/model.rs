@@ -1,0 +1,20 @@
+//! Model files; their content is that of [`Model`].
+
+use crate::formats::format::{Format, Head};
+use crate::formats::source::Content;
+use crate::model::Model;
+
+/// A fitted model, as safetensors.
+pub(crate) const FORMAT: Format = Format {
+    name: "gpbrdf model",
+    file: "gpbrdf model",
+    recognises,
+    read: |path| Ok(Content::Model(Box::new(Model::load(path)?))),
+};
+
+/// A length of eight bytes that fits into the file, then JSON.
+fn recognises(head: &Head<'_>) -> bool {
+    head.bytes.first_chunk::<8>().zip(head.bytes.get(8)).is_some_and(|(size, &first)| {
+        first == b'{' && u64::from_le_bytes(*size) <= head.length.saturating_sub(8)
+    })
+}
