@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use gpbrdf_core::base::number::significant;
+use gpbrdf_core::judge::SampleMetrics;
 use gpbrdf_core::{Content, IntervalOf, Metrics, Model, SampleSet, Source, bake_mean, bake_sigma};
 use serde::Serialize;
 use serde_json::Value;
@@ -65,49 +66,30 @@ impl Eval {
         terminal: &Terminal,
         prediction: &Source,
         truth: &Source,
-        model: &gpbrdf_core::Model,
-        samples: &gpbrdf_core::Samples,
+        model: &Model,
+        samples: &SampleSet,
     ) -> Result<()> {
-        let angles: Vec<_> = samples.samples.iter().map(gpbrdf_core::Sample::half_diff).collect();
-        let predicted = terminal.stage("Predicting", || model.predict(&angles, IntervalOf::Observation));
-        let (mut absolute, mut square, mut covered) = (0.0, 0.0, 0usize);
-        let mut logs = Vec::with_capacity(3 * samples.samples.len());
-        for (sample, p) in samples.samples.iter().zip(&predicted) {
-            for c in 0..3 {
-                let (f, g) = (sample.value[c], p.mean[c]);
-                absolute += (f - g).abs();
-                square += (f - g).powi(2);
-                covered += usize::from(p.lower[c] <= f && f <= p.upper[c]);
-                logs.push(((g + 1e-3).ln() - (f + 1e-3).ln()).abs());
-            }
-        }
-        logs.sort_unstable_by(f64::total_cmp);
-        let n = logs.len() as f64;
-        let rmse = (logs.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
-        let metrics = serde_json::json!({
-            "samples": samples.samples.len(),
-            "mae": absolute / n,
-            "mse": square / n,
-            "log_rmse": rmse,
-            "median_abs_log": logs[logs.len() / 2],
-            "coverage_95": covered as f64 / n,
-        });
+        let predicted =
+            terminal.stage("Predicting", || model.predict(&samples.angles, IntervalOf::Observation))?;
+        let metrics = SampleMetrics::new(&samples.values, &predicted)?;
         if self.json {
-            return self.print(terminal, prediction, truth, metrics);
+            return self.print(terminal, prediction, truth, serde_json::to_value(&metrics)?);
         }
         terminal.summary(&format!(
             "{} against {} samples of {}",
             prediction.origin(),
-            angles.len(),
+            metrics.samples,
             truth.origin()
         ))?;
         terminal.summary(&format!(
-            "  median |ln error| {:.4}, rms ln error {rmse:.4}, MAE {} /sr, MSE {} /sr^2\n  95 % interval covers {:.1} % of the samples",
-            logs[logs.len() / 2],
-            significant(absolute / n),
-            significant(square / n),
-            100.0 * covered as f64 / n
-        ))
+            "  median |ln error| {:.4}, rms ln error {:.4}, MAE {} /sr, MSE {} /sr^2",
+            metrics.median_abs_log,
+            metrics.log_rmse,
+            significant(metrics.mae, 4),
+            significant(metrics.mse, 4),
+        ))?;
+        terminal
+            .summary(&format!("  95 % interval covers {:.1} % of the samples", 100.0 * metrics.coverage_95))
     }
 
     fn print(&self, terminal: &Terminal, prediction: &Source, truth: &Source, metrics: Value) -> Result<()> {
