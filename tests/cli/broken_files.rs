@@ -3,7 +3,8 @@
 
 use std::sync::OnceLock;
 
-use gpbrdf_core::{BrdfTable, write_merl_to};
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::write_merl_to;
 
 use crate::harness::{Cli, data_dir};
 

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use gpbrdf_core::{BrdfTable, write_merl};
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::write_merl;
 
 use crate::harness::{Cli, metric};
 

@@ -1,6 +1,7 @@
 //! `--backend` and `shader`.
 
-use gpbrdf_core::{Metrics, read_merl};
+use gpbrdf_core::Metrics;
+use gpbrdf_core::formats::read_merl;
 
 use crate::harness::Cli;
 

@@ -1,7 +1,7 @@
-//! A run of everything, in which neither wgpu nor the driver's validation layer has anything to say.
+//! A run of everything, in which neither wgpu nor the validation layer of the driver logs a warning.
 //!
-//! Its own process: the logger and the debugging flags of the instance are global. The layer is that of Debian's
-//! vulkan-validationlayers; without it wgpu's own validation remains.
+//! This is a process of its own, because the logger and the debugging flags of the instance are global. The
+//! layer is in Debian's package vulkan-validationlayers; without it, the validation of wgpu itself remains.
 #![expect(clippy::unwrap_used, reason = "a test")]
 
 use std::ops::ControlFlow;
@@ -12,15 +12,19 @@ use gpbrdf_core::{
     Solver, Source, TableFitOptions, bake_mean, bake_sigma, fit, fit_table,
 };
 use gpbrdf_render::{
-    AdapterChoice, Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh,
-    Precision, Renderer, Sampling, ShadingOptions, Show, ToneCurve, evaluate,
+    Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh, Precision, Renderer,
+    Sampling, ShadingOptions, Show, ToneCurve, evaluate, glam,
 };
 
-/// What was logged at the level of a warning or above.
+#[path = "support/mod.rs"]
+mod support;
+
+/// Messages at the level of a warning or above.
 static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// What is not about this crate: no layer, one that is older than the number of WGSL among the languages of SPIR-V's debug
-/// information (`WGPU_DEBUG=0` leaves that out), and graphics libraries that are looked at and not taken.
+/// Parts of messages that are not about this crate: there is no layer, the layer is older than the number of
+/// WGSL among the languages in the debug information of SPIR-V (`WGPU_DEBUG=0` leaves that out), and wgpu
+/// tries graphics libraries that it then does not use.
 const FOREIGN: [&str; 4] = [
     "unable to find layer",
     "Invalid source language operand: 10",
@@ -126,14 +130,13 @@ fn render_all(context: &Context, model: &Model) {
 fn a_run_of_everything_raises_no_warning() {
     log::set_logger(&Logger).unwrap();
     log::set_max_level(log::LevelFilter::Warn);
-    let context = match Context::open(AdapterChoice::Any) {
-        Ok(context) => context,
-        Err(error) if std::env::var("GPBRDF_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => return eprintln!("skipped: {error}"),
-    };
+    support::on_device("a_run_of_everything_raises_no_warning", run_everything);
+}
+
+fn run_everything(context: &Context) {
     let models = models();
-    bake_all(&context, &models);
-    render_all(&context, &models[0]);
+    bake_all(context, &models);
+    render_all(context, &models[0]);
     context.wait("test").unwrap();
     let all = std::mem::take(&mut *WARNINGS.lock().unwrap());
     let (known, raised): (Vec<String>, Vec<String>) =

@@ -53,7 +53,7 @@ impl Viewer {
         let from_left = |text: &str| label(picture.left() + 8.0, Align2::LEFT_TOP, text);
         match self.settings.sphere {
             SphereShown::Sigma => from_left("Sigma"),
-            SphereShown::Difference if has_truth => from_left("1 - prediction / truth"),
+            SphereShown::Difference if has_truth => from_left("Prediction - truth, exposed, mean of R, G, B"),
             SphereShown::Swipe if has_truth => {
                 let x = egui::lerp(picture.left()..=picture.right(), self.settings.swipe);
                 let stroke = egui::Stroke::new(1.5, Color32::from_white_alpha(200));

@@ -215,7 +215,7 @@ impl Scene {
         let display = Display {
             exposure: key.exposure.max(1e-6),
             background: if key.light.point { Background::Black } else { Background::Environment },
-            limit: LIMIT,
+            limit: Some(LIMIT),
             ..Display::default()
         };
         let shown = |renderer: &mut Renderer, show: Show| -> Result<ColorImage, Stop> {

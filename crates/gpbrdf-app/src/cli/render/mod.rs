@@ -81,7 +81,8 @@ pub(crate) struct Render {
     /// Tone curve.
     #[arg(long, value_enum, default_value = "filmic")]
     tone: ToneName,
-    /// What the picture shows; the difference is 1 - prediction / truth.
+    /// What the picture shows; the difference is prediction - truth in exposed linear light, red where too
+    /// bright.
     #[arg(long, value_enum, default_value = "prediction")]
     show: ShowName,
     /// What is behind the object.

@@ -10,6 +10,9 @@ use gpbrdf_render::{Background, Display, LinearPicture, Renderer};
 
 use super::choices::ShowName;
 
+/// The formula of the difference, as figures state it.
+const DIFFERENCE: &str = "prediction - truth, linear, mean of R, G, B; 1 = white";
+
 /// A rendered picture and how to show it.
 pub(super) struct Pictures<'a> {
     pub(super) renderer: &'a mut Renderer,
@@ -30,7 +33,7 @@ impl Pictures<'_> {
             ShowName::Truth => colour(&linear.truth),
             ShowName::Prediction => colour(&linear.prediction),
             ShowName::Sigma => grey(&linear.sigma),
-            ShowName::Difference => grey(&linear.difference()),
+            ShowName::Difference => grey(&linear.difference(1.0)),
         };
         Ok(write_image_exr(file, linear.width, linear.height, &pixels)?)
     }
@@ -39,15 +42,14 @@ impl Pictures<'_> {
     pub(super) fn write_comparison(&mut self, file: &mut AtomicFile) -> Result<()> {
         let shown = [ShowName::Truth, ShowName::Prediction, ShowName::Difference];
         let panels = shown.into_iter().map(|show| self.panel(show)).collect::<Result<Vec<_>>>()?;
-        let note = "difference: 1 - prediction / truth, means of R, G, B";
-        Ok(panel_figure(self.title, &panels, note).write_png(file)?)
+        Ok(panel_figure(self.title, &panels, &format!("difference: {DIFFERENCE}")).write_png(file)?)
     }
 
     /// Writes a picture as shown; one in false colours as a figure with its scale.
     pub(super) fn write_png(&mut self, file: &mut AtomicFile, show: ShowName) -> Result<()> {
         let note = match show {
             ShowName::Sigma => "weighted by reflected light",
-            ShowName::Difference => "1 - prediction / truth, means of R, G, B",
+            ShowName::Difference => DIFFERENCE,
             ShowName::Truth | ShowName::Prediction => return self.write_plain(file, show),
         };
         let panel = self.panel(show)?;
@@ -74,12 +76,12 @@ impl Pictures<'_> {
                 ("sigma", Some(Scale { map: Colormap::Sequential, low: 0.0, high }))
             }
             ShowName::Difference => {
-                let high = self.limit_of(&self.linear.difference());
+                let high = self.limit_of(&self.linear.difference(self.display.exposure));
                 ("difference", Some(Scale { map: Colormap::Diverging, low: -high, high }))
             }
         };
         #[expect(clippy::cast_possible_truncation, reason = "shaders compute in single precision")]
-        let limit = scale.map_or(self.display.limit, |scale| scale.high as f32);
+        let limit = scale.map(|scale| scale.high as f32);
         let pixels = self.renderer.read_display(&Display { show: show.into(), limit, ..self.display })?;
         Ok(Panel { picture: self.picture(&pixels), caption, scale })
     }
