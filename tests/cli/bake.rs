@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use gpbrdf_core::{BrdfTable, MERL_BYTES, Source, read_merl, read_table_exr};
+use gpbrdf_core::formats::{MERL_BYTES, read_merl, read_table_exr};
+use gpbrdf_core::{BrdfTable, Source};
 use serde_json::Value;
 
 use crate::harness::{Cli, metric};
@@ -36,7 +37,7 @@ fn writes_everything_and_reports_it() {
     assert_eq!(report["samples"], 576);
     assert_eq!(report["solver"], "lattice");
     assert_eq!(report["backend"], "cpu");
-    assert!(report["kernel"].as_str().unwrap().contains("matern_5_2"), "{}", report["kernel"]);
+    assert!(report["kernel"].as_str().unwrap().contains("matern52"), "{}", report["kernel"]);
     assert!(report["converged"].as_bool().unwrap());
     assert!(report["evaluations"].as_u64().unwrap() > 3);
     assert!(report["log_marginal_likelihood"].as_f64().unwrap().is_finite());

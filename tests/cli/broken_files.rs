@@ -1,9 +1,10 @@
-//! Damaged, foreign and absent files: exit code 1, one line that names file, expectation and finding, and nothing
-//! written.
+//! Damaged, foreign and absent files: exit code 1, one line that names the file, what was expected and what
+//! was found, and no file written.
 
 use std::sync::OnceLock;
 
-use gpbrdf_core::{BrdfTable, write_merl_to};
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::write_merl_to;
 
 use crate::harness::{Cli, data_dir};
 
@@ -93,8 +94,8 @@ fn damaged_merl_files() {
         &cli,
         "a.binary",
         &file(
-            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel R, \
-             theta_h 0, theta_d 0, phi_d 0",
+            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel \
+             R, theta_h 0, theta_d 0, phi_d 0",
         ),
     );
     cli.write("a.binary", filled(-1.0));

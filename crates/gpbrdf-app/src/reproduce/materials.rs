@@ -10,6 +10,7 @@ use super::measures::{
 };
 use super::paper_lattice::{paper_cells, paper_options, paper_samples};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 /// The paper's table 2: MAE, MSE and what it calls PSNR.
 const PAPER: [(&str, [f64; 3]); 6] = [
@@ -20,9 +21,6 @@ const PAPER: [(&str, [f64; 3]); 6] = [
     ("silver-paint", [0.0124, 0.0345, 62.7547]),
     ("violet-rubber", [0.0054, 0.0253, 64.0961]),
 ];
-
-/// The paper's number of samples.
-pub(super) const PAPER_SAMPLES: usize = 37_616;
 
 const MEASURES: [Measure; 7] = [MAE, MSE, PAPER_PSNR, PSNR_ENV, PSNR_POINT, SSIM_ENV, MEDIAN_LN];
 
@@ -40,7 +38,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             table.rows.push(row);
         }
         let truth = material.truth()?;
-        let theirs = paper_options(vec![Shape::RationalQuadratic { alpha: 1.0 }]);
+        let theirs = paper_options(&[Shape::RationalQuadratic { alpha: 1.0 }]);
         let settings = [
             ("the paper's, thinned", paper_samples(&truth, most), theirs),
             ("ours", material.lattice_samples(PAPER_SAMPLES)?, FitOptions::default()),
@@ -55,18 +53,20 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(format!(
-        "The paper's setting: identity transform, zero mean, ARD rational quadratic on plain angles, dense, on its lattice of every \
-         5th theta_h, 3rd theta_d and 2nd phi_d cell, {} of them above the horizon in our numbering (the paper: {PAPER_SAMPLES}). \
-         All of them would take a matrix of 11 GB and hours; here {} are taken, spread evenly: what a budget of {} s is expected to \
-         hold. Ours: ln(f + 0.001), lattice in the warped box, Matern 5/2.",
+        "The paper's setting: identity transform, zero mean, ARD rational quadratic on plain angles, dense, \
+         on its lattice of every 5th theta_h, 3rd theta_d and 2nd phi_d cell, {} of them above the horizon \
+         in our numbering (the paper: {PAPER_SAMPLES}). All of them would take a matrix of 11 GB and hours; \
+         here {} are taken, spread evenly: what a budget of {} s is expected to hold. Ours: ln(f + 0.001), \
+         lattice in the warped box, Matern 5/2.",
         paper_cells().len(),
         most.min(paper_cells().len()),
         context.budget
     ));
     table.note(
-        "\"paper's PSNR\" is 10 log10(255^2 / MSE), which gives the paper's column from its own MSE column: it says nothing about \
-         pictures, and no more than the MSE. PSNR env and point are of pictures of a sphere. The paper's figures are for the \
-         measured MERL tables; where the truth is a reconstruction from a published fit, they stand there for orientation only.",
+        "\"paper's PSNR\" is 10 log10(255^2 / MSE), which gives the paper's column from its own MSE column: \
+         it says nothing about pictures, and no more than the MSE. PSNR env and point are of pictures of a \
+         sphere. The paper's figures are for the measured MERL tables; where the truth is a reconstruction \
+         from a published fit, they stand there for orientation only.",
     );
     Ok(Outcome { tables: vec![table], figures: Vec::new() })
 }

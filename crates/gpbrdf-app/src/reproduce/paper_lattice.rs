@@ -1,11 +1,14 @@
-//! The paper's own setting: its lattice of table cells, its kernel, and what of it a dense solver can hold.
+//! The paper's own setting: its lattice of table cells, thinned to what a dense solver can hold, and its
+//! kernel.
 
+use gpbrdf_core::base::golden_ratio_subset;
+use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
+use gpbrdf_core::sample::{InputSpace, SampleLayout};
 use gpbrdf_core::{
-    Brdf, BrdfTable, FitOptions, HalfDiff, InputSpace, MeanFunction, N_PHI_D, N_THETA_D, N_THETA_H,
-    SampleSet, Shape, Solver, Transform, cell_center,
+    Brdf, BrdfTable, FitOptions, HalfDiff, MeanFunction, Provenance, SampleSet, Shape, Solver, Transform,
 };
 
-/// Every fifth `theta_h`, third `theta_d` and second `phi_d` cell, those above the horizon: the paper counts 37,616.
+/// Every fifth `theta_h`, third `theta_d` and second `phi_d` cell above the horizon; the paper counts 37,616.
 pub(super) fn paper_cells() -> Vec<HalfDiff> {
     let mut cells = Vec::new();
     for h in (0..N_THETA_H).step_by(5) {
@@ -17,30 +20,28 @@ pub(super) fn paper_cells() -> Vec<HalfDiff> {
     cells
 }
 
-/// `count` of the paper's cells, spread evenly over them: those whose index times the golden ratio has the smallest
-/// fractions.
+/// Measures `count` of the paper's cells, spread evenly over them.
 pub(super) fn paper_samples(truth: &BrdfTable, count: usize) -> SampleSet {
     let cells = paper_cells();
-    let mut order: Vec<usize> = (0..cells.len()).collect();
-    let fraction = |i: usize| (i as f64 * 0.618_033_988_749_894_9).fract();
-    order.sort_by(|&a, &b| fraction(a).total_cmp(&fraction(b)));
-    order.truncate(count);
+    let mut order = golden_ratio_subset(cells.len(), count);
     order.sort_unstable();
     let angles: Vec<HalfDiff> = order.into_iter().map(|i| cells[i]).collect();
     let values = angles.iter().map(|&a| truth.eval_half_diff(a)).collect();
-    SampleSet { angles, values, lattice: None, layout: "cells" }
+    let origin = Provenance { layout: SampleLayout::Cells, ..Provenance::default() };
+    SampleSet { angles, values, origin, ..SampleSet::default() }
 }
 
-/// Identity transform, zero mean, kernels on the plain half-difference angles, dense.
-pub(super) fn paper_options(kernel: Vec<Shape>) -> FitOptions {
+/// The paper's model: a dense process on `f` itself, with zero mean and kernels on the plain half-difference
+/// angles.
+pub(super) fn paper_options(kernel: &[Shape]) -> FitOptions {
     FitOptions {
         solver: Solver::Dense,
-        kernel,
         transform: Transform::Identity,
         mean: MeanFunction::Zero,
         space: InputSpace::HalfDiff,
         ..FitOptions::default()
     }
+    .with_kernel(kernel)
 }
 
 #[cfg(test)]

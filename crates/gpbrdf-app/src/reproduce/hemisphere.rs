@@ -3,10 +3,11 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use anyhow::Result;
-use gpbrdf_core::{
-    AxisMetric, Brdf, Noise, OptimizeOptions, Panel, Picture, Shape, direction, fit_dense, material,
-    panel_figure,
-};
+use gpbrdf_core::brdf::{direction, material};
+use gpbrdf_core::figure::{Panel, Picture, panel_figure};
+use gpbrdf_core::gp::{DenseFit, OptimizeOptions};
+use gpbrdf_core::kernel::AxisMetric;
+use gpbrdf_core::{Brdf, Noise, Shape};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
@@ -14,14 +15,14 @@ use super::table::{Table, number};
 
 /// The light's polar angle; it stands at azimuth pi, so that its mirror image is at azimuth 0.
 const LIGHT_DEGREES: f64 = 30.0;
-/// Views reach so far down: beyond, some models divide by a cosine that vanishes.
+/// The largest polar angle of a view: beyond it, some models divide by a cosine that vanishes.
 const LIMIT_DEGREES: f64 = 85.0;
 /// Added to `f` before the logarithm, sr^-1.
 const EPSILON: f64 = 1e-3;
-/// Numbers of samples that are tried, until one is good enough.
+/// The numbers of samples that are tried in this order, until one is good enough.
 const LADDER: [usize; 8] = [50, 100, 150, 200, 300, 500, 900, 1600];
 
-/// Model, and the paper's MAE and MSE where it gives them.
+/// Each model, with the paper's MAE and MSE if it states them.
 const MODELS: [(&str, Option<(f64, f64)>); 6] = [
     ("phong", Some((1.72e-4, 0.0017))),
     ("bank-phong", Some((0.0021, 0.0167))),
@@ -31,14 +32,14 @@ const MODELS: [(&str, Option<(f64, f64)>); 6] = [
     ("cook-torrance", None),
 ];
 
-/// Where the paper says nothing, the goal of its neighbour Blinn.
+/// The goal for the model for which the paper states no error: that of Blinn, the model before it.
 const GOAL_WITHOUT_PAPER: f64 = 4.31e-5;
 
-/// Banks's anisotropic Phong, of fibres along `y`.
+/// Banks's anisotropic Phong model, with fibres along `y`.
 ///
-/// `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, s_i s_o - t_i t_o)^n` with `t` the component of a direction
-/// along the fibre and `s = sqrt(1 - t^2)`: D. C. Banks, "Illumination in Diverse Codimensions" (1994), with the factor of
-/// the modified Phong model.
+/// `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, s_i s_o - t_i t_o)^n` with `t` the component of a
+/// direction along the fibre and `s = sqrt(1 - t^2)`: D. C. Banks, "Illumination in Diverse Codimensions"
+/// (1994), with the factor of the modified Phong model.
 struct Banks {
     diffuse: f64,
     specular: f64,
@@ -68,13 +69,13 @@ fn value(model: &str, view: View) -> Result<f64> {
     Ok(rgb.iter().sum::<f64>() / 3.0)
 }
 
-/// Where the kernel sees a view: on a disc whose radius is the polar angle.
+/// The coordinates of a view for the kernel: a disc whose radius is the polar angle.
 fn coordinates((theta, phi): View) -> [f64; 2] {
     [theta * phi.cos(), theta * phi.sin()]
 }
 
-/// A half disc of `count` views, golden-angle spaced, even by area in `theta`; half of them within 35 degrees of the
-/// mirror direction.
+/// `count` views on a half disc, spaced by the golden angle and evenly by area in `theta`; half of them are
+/// within 35 degrees of the mirror direction.
 fn training(count: usize) -> Vec<View> {
     let golden = PI * (3.0 - 5f64.sqrt());
     let near = count / 2;
@@ -114,9 +115,15 @@ fn fit_model(model: &str, count: usize) -> Result<Prediction> {
         samples.iter().map(|&view| Ok((value(model, view)? + EPSILON).ln())).collect::<Result<Vec<_>>>()?;
     let mean = y.iter().sum::<f64>() / y.len() as f64;
     let y: Vec<f64> = y.iter().map(|y| y - mean).collect();
-    let shapes = [Shape::RationalQuadratic { alpha: 2.0 }];
-    let options = OptimizeOptions { max_iterations: 60, ..OptimizeOptions::default() };
-    let (gp, _) = fit_dense(&x, &[y], &[AxisMetric::Linear; 2], &shapes, Noise::Optimized, &options)?;
+    let search = DenseFit {
+        x: &x,
+        targets: &[y],
+        metrics: &[AxisMetric::Linear; 2],
+        shapes: &[Shape::RationalQuadratic { alpha: 2.0 }],
+        noise: Noise::Optimized,
+        options: &OptimizeOptions { max_iterations: 60, ..OptimizeOptions::default() },
+    };
+    let (gp, _) = search.run(&|| Ok(()))?;
     let predict = move |views: &[View]| -> Result<Vec<f64>> {
         let x: Vec<f64> = views.iter().flat_map(|&view| coordinates(view)).collect();
         Ok(gp.predict_mean(&x)?.into_iter().map(|g| ((g + mean).exp() - EPSILON).max(0.0)).collect())
@@ -167,22 +174,26 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         outcome.picture(format!("figure1-{model}.png"), &figure(model, &best)?)?;
     }
     table.note(format!(
-        "Light at {LIGHT_DEGREES} degrees; views down to {LIMIT_DEGREES} degrees, every degree of polar angle and every \
-         second of azimuth, unweighted; f in 1/sr, mean of R, G and B. The paper states neither its parameters nor its light nor \
-         its grid, so the comparison is one of orders of magnitude: ours are the built-in materials of these names. The smallest of \
-         {ladder:?} samples that reaches a tenth of the paper's MAE is shown, else the best (cook-torrance: a tenth of Blinn's, as \
-         the paper gives no figure). Samples lie in one half of the hemisphere: all six models are even about the plane of incidence."
+        "Light at {LIGHT_DEGREES} degrees; views down to {LIMIT_DEGREES} degrees, every degree of polar \
+         angle and every second of azimuth, unweighted; f in 1/sr, mean of R, G and B. The paper states \
+         neither its parameters nor its light nor its grid, so the comparison is one of orders of magnitude: \
+         ours are the built-in materials of these names. The smallest of {ladder:?} samples that reaches a \
+         tenth of the paper's MAE is shown, else the best (cook-torrance: a tenth of Blinn's, as the paper \
+         gives no figure). Samples lie in one half of the hemisphere: all six models are even about the \
+         plane of incidence."
     ));
     table.note(
-        "\"Bank Phong\" is read as D. C. Banks's anisotropic Phong (1994), with fibres across the plane of incidence; the paper's \
-         reference leaves it open. Dense process, ARD rational quadratic on the disc of views, target ln(f + 0.001). In the \
-         paper MSE exceeds MAE, though all errors are below 1: its column may be a root mean square.",
+        "\"Bank Phong\" is read as D. C. Banks's anisotropic Phong (1994), with fibres across the plane of \
+         incidence; the paper's reference leaves it open. Dense process, ARD rational quadratic on the disc \
+         of views, target ln(f + 0.001). In the paper MSE exceeds MAE, though all errors are below 1: its \
+         column may be a root mean square.",
     );
     outcome.tables.push(table);
     Ok(outcome)
 }
 
-/// Truth, prediction with its samples in red, and the difference's size, as discs of views.
+/// Discs of views that show the truth, the prediction with its samples in red, and the size of their
+/// difference.
 fn figure(model: &str, found: &Prediction) -> Result<Picture> {
     const SIZE: usize = 220;
     let limit = LIMIT_DEGREES.to_radians();

@@ -1,9 +1,11 @@
-//! Beyond the paper: against Neural BRDF, the curve of samples, and the calibration of the interval.
+//! Beyond the paper: a comparison with Neural BRDF, errors against the number of samples, and the calibration
+//! of the interval.
 
 use anyhow::Result;
+use gpbrdf_core::brdf::analytic::NEURAL_FLOATS;
 use gpbrdf_core::{
-    Brdf, BrdfTable, FitOptions, InducingSize, LatticeLayout, Metrics, NEURAL_FLOATS, Provenance,
-    TableFitOptions, detect_symmetry, fit_table,
+    Brdf, BrdfTable, CompressOptions, FitOptions, InducingSize, LatticeLayout, Metrics, Provenance, compress,
+    detect_symmetry,
 };
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -18,7 +20,8 @@ use super::table::{Table, number};
 const COUNTS: [usize; 7] = [20, 40, 160, 400, 1000, 4000, 37_000];
 const QUICK_COUNTS: [usize; 4] = [20, 160, 1000, 37_000];
 
-/// A lattice that stores no more than Neural BRDF: each measurement is three floats, each coordinate of the nodes one more.
+/// A lattice that stores no more floats than Neural BRDF: each measurement takes three, each coordinate of
+/// the nodes one more.
 const EQUAL_SHAPE: [usize; 3] = [11, 6, 3];
 
 const MEASURES: [Measure; 9] =
@@ -51,7 +54,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
                 json!(material.name()),
                 json!(material.origin),
                 json!(n),
-                json!(fitted.model.floats()),
+                json!(fitted.model.n_floats()),
                 number(fitted.fit_seconds),
             ];
             row.extend(cells(&MEASURES, &fitted.metrics));
@@ -64,13 +67,14 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
     rivals.add_means(2);
     curve.add_means(2);
     rivals.note(
-        "Neural BRDF and the inducing lattices see the whole table: the first was trained on it by its authors, the second are fitted \
-         to all its valid cells. The exact lattice sees no more than it stores. The floats of ours include every constant. \
-         Without --nbrdf, or where it has no fit of a material, ours stand alone.",
+        "Neural BRDF and the inducing lattices are given the whole table: the first was trained on it by its \
+         authors, the second are fitted to all its valid cells. The exact lattice is given no more than it \
+         stores. The floats of ours include every constant. Without --nbrdf, or where it has no fit of a \
+         material, ours stand alone.",
     );
     curve.note(
-        "Exact lattice process, default options. Coverage is the share of all valid cells inside the 95 % interval of a measurement: \
-         0.95 is calibrated, less is too sure of itself.",
+        "Exact lattice process, default options. Coverage is the share of all valid cells inside the 95 % \
+         interval of a measurement: 0.95 is calibrated, less is too sure of itself.",
     );
     let mut outcome = Outcome { tables: vec![rivals, curve], figures: Vec::new() };
     let x = Axis { name: "measurements", logarithmic: true };
@@ -81,7 +85,8 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Rows for Neural BRDF, where there is a fit of this material, for inducing lattices and for an exact lattice of as many floats.
+/// Adds rows for Neural BRDF, if there is a fit of this material, for inducing lattices, and for an exact
+/// lattice that stores as many floats.
 fn against_neural(
     context: &Context,
     material: Material<'_>,
@@ -99,20 +104,20 @@ fn against_neural(
         let metrics = Metrics::new(truth, &predicted, &context.environment, None)?;
         add("Neural BRDF", NEURAL_FLOATS, Value::Null, &metrics);
     }
-    let options = TableFitOptions {
+    let options = CompressOptions {
         size: InducingSize::Floats(NEURAL_FLOATS),
         symmetry: detect_symmetry(truth),
-        ..TableFitOptions::default()
+        ..CompressOptions::default()
     };
     let start = Instant::now();
-    let (model, _) = fit_table(truth, &options, Provenance::default())?;
+    let model = compress(truth, &options, Provenance::default())?.model;
     let seconds = start.elapsed().as_secs_f64();
-    let floats = model.floats();
+    let floats = model.n_floats();
     let fitted = context.compare(truth, model, seconds, true)?;
     add("inducing lattices", floats, number(seconds), &fitted.metrics);
     let samples = material.measure(|symmetry| Ok(LatticeLayout::with_shape(EQUAL_SHAPE, symmetry)))?;
     let fitted = context.fit_and_compare(truth, &samples, &FitOptions::default(), true)?;
     let name = format!("lattice of {} measurements", samples.angles.len());
-    add(&name, fitted.model.floats(), number(fitted.fit_seconds), &fitted.metrics);
+    add(&name, fitted.model.n_floats(), number(fitted.fit_seconds), &fitted.metrics);
     Ok(())
 }

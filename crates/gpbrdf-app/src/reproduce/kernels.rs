@@ -5,16 +5,16 @@ use gpbrdf_core::{FitOptions, Shape};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
-use super::materials::PAPER_SAMPLES;
 use super::measures::{MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, cells, columns};
 use super::paper_lattice::{paper_options, paper_samples};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 const RQ: Shape = Shape::RationalQuadratic { alpha: 1.0 };
 const SE: Shape = Shape::SquaredExponential;
 const MATERN: Shape = Shape::Matern32;
 
-/// Kernel, and the paper's MAE, MSE and PSNR.
+/// Each kernel, with the paper's MAE, MSE and PSNR.
 const KERNELS: [(&str, &[Shape], [f64; 3]); 6] = [
     ("RQ", &[RQ], [0.0134, 0.0830, 54.4767]),
     ("SE", &[SE], [0.0156, 0.0875, 50.2725]),
@@ -39,16 +39,15 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             &["fit s", "paper MAE", "paper MSE", "paper PSNR"],
         ),
     );
-    // Sums search over twice the parameters; all are given as many samples as a sum can have.
+    // A sum has twice as many parameters to search. All kernels are given as many samples as a sum can have.
     let most = context.dense_samples(2);
     let few = paper_samples(&truth, most);
     let many = material.lattice_samples(PAPER_SAMPLES)?;
     for (setting, samples) in [("dense", few), ("lattice", many)] {
         for (kernel, shapes, paper) in KERNELS {
-            let kernels = shapes.to_vec();
-            let options = match samples.lattice {
-                None => paper_options(kernels),
-                Some(_) => FitOptions { kernel: kernels, ..FitOptions::default() },
+            let options = match samples.lattice() {
+                None => paper_options(shapes),
+                Some(_) => FitOptions::default().with_kernel(shapes),
             };
             let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
             let mut row = vec![json!(kernel), json!(setting), json!(samples.angles.len())];
@@ -58,9 +57,10 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(format!(
-        "Dense: the paper's setting with ARD kernels on {most} of its cells, what a budget of {} s is expected to hold for a sum. \
-         Lattice: products of 1-D kernels along the axes, not ARD kernels, on ln(f + 0.001). Matern is of order 3/2: the paper does \
-         not say which it takes, nor which material its figures are for, nor how its PSNR was had.",
+        "Dense: the paper's setting with ARD kernels on {most} of its cells, what a budget of {} s is \
+         expected to hold for a sum. Lattice: products of 1-D kernels along the axes, not ARD kernels, on \
+         ln(f + 0.001). Matern is of order 3/2: the paper does not say which it takes, nor which material \
+         its figures are for, nor how its PSNR was had.",
         context.budget
     ));
     Ok(Outcome { tables: vec![table], figures: Vec::new() })

@@ -1,25 +1,27 @@
-//! What all experiments share: options, materials, and the comparison of a model with its truth.
+//! Options and materials, which all experiments share, and the comparison of a model with its truth.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
+use gpbrdf_core::brdf::analytic::NeuralBrdf;
+use gpbrdf_core::figure::Picture;
+use gpbrdf_core::formats::{merl_material_name, sha256_file};
 use gpbrdf_core::{
-    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, NeuralBrdf, Provenance,
-    SampleSet, Source, Symmetry, bake_mean, bake_sigma, dense_cost, detect_symmetry, fit,
+    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet, Source, Symmetry,
+    bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
 use super::table::Table;
-use crate::cli::report::cell_interval;
-use crate::cli::terminal::Terminal;
+use crate::job::{Observer, judge, samples_within};
 
-/// What an experiment leaves: tables, and pictures by their file names.
+/// The results of an experiment: tables, and pictures with the names of their files.
 #[derive(Debug, Default)]
-pub(super) struct Outcome {
-    pub(super) tables: Vec<Table>,
-    pub(super) figures: Vec<(String, Vec<u8>)>,
+pub(crate) struct Outcome {
+    pub(crate) tables: Vec<Table>,
+    pub(crate) figures: Vec<(String, Vec<u8>)>,
 }
 
 impl Outcome {
@@ -37,7 +39,7 @@ impl Outcome {
     }
 
     /// Adds a picture as a PNG file.
-    pub(super) fn picture(&mut self, file: String, picture: &gpbrdf_core::Picture) -> Result<()> {
+    pub(super) fn picture(&mut self, file: String, picture: &Picture) -> Result<()> {
         let mut bytes = Vec::new();
         picture.write_png(&mut bytes).with_context(|| format!("cannot draw \"{file}\""))?;
         self.figures.push((file, bytes));
@@ -46,7 +48,7 @@ impl Outcome {
 }
 
 /// The materials of the paper's table 2, and the one of its figures.
-pub(super) const PAPER_MATERIALS: [&str; 7] = [
+pub(crate) const PAPER_MATERIALS: [&str; 7] = [
     "red-plastic",
     "purple-paint",
     "blue-rubber",
@@ -56,32 +58,29 @@ pub(super) const PAPER_MATERIALS: [&str; 7] = [
     "cherry-235",
 ];
 
-/// Evaluations of likelihood and gradient that a dense search is taken to need.
-const DENSE_EVALUATIONS: usize = 40;
-
-/// The largest dense run, whatever the budget: its matrix takes 3.2 GB.
+/// The largest number of samples of a dense fit, whatever the budget: its matrix takes 3.2 GB.
 const MAX_DENSE: usize = 20_000;
 
 #[derive(Debug)]
-pub(super) struct Context {
-    pub(super) quick: bool,
+pub(crate) struct Context {
+    pub(crate) quick: bool,
     /// Seconds for one dense fit.
-    pub(super) budget: f64,
-    pub(super) environment: Environment,
+    pub(crate) budget: f64,
+    pub(crate) environment: Environment,
     /// Stand-ins for the paper's materials, [`PAPER_MATERIALS`].
-    pub(super) built_in: Vec<Source>,
+    pub(crate) built_in: Vec<Source>,
     /// The measurements found with `--data`.
-    pub(super) measured: Vec<Source>,
-    /// Restriction to these materials, where there is one.
-    pub(super) only: Vec<String>,
-    pub(super) neural: Vec<(String, NeuralBrdf)>,
+    pub(crate) measured: Vec<Source>,
+    /// The only materials to use; all if empty.
+    pub(crate) only: Vec<String>,
+    pub(crate) neural: Vec<(String, NeuralBrdf)>,
 }
 
 /// A material of an experiment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Material<'a> {
     source: &'a Source,
-    /// What kind of truth it is, for people.
+    /// What people read about its truth.
     pub(super) origin: &'a str,
 }
 
@@ -93,38 +92,33 @@ impl<'a> Material<'a> {
     /// The table that predictions are compared with.
     ///
     /// # Errors
-    /// A source of scattered samples.
+    /// If the source is scattered samples.
     pub(super) fn truth(&self) -> Result<Cow<'a, BrdfTable>> {
-        self.source.table().with_context(|| self.shapeless())
+        Ok(self.source.table()?)
     }
 
-    /// Asks the source itself on the default lattice of about `count` nodes.
+    /// Measures the source on the default lattice of about `count` nodes.
     ///
     /// # Errors
-    /// A source of scattered samples, or a count out of range.
+    /// If the source is scattered samples, or the count out of range.
     pub(super) fn lattice_samples(&self, count: usize) -> Result<SampleSet> {
         self.measure(|symmetry| Ok(LatticeLayout::with_samples(count, symmetry)?))
     }
 
-    /// Asks the source itself on a lattice that relies on the symmetry it has.
+    /// Measures the source on a lattice that relies on the symmetry of the source.
     ///
     /// # Errors
-    /// A source of scattered samples, or a broken lattice.
+    /// If the source is scattered samples, or the lattice broken.
     pub(super) fn measure(
         &self,
         layout: impl FnOnce(Symmetry) -> Result<LatticeLayout>,
     ) -> Result<SampleSet> {
-        let brdf = self.source.brdf().with_context(|| self.shapeless())?;
-        let lattice = layout(detect_symmetry(brdf))?;
-        Ok(SampleSet::measure(brdf, &Layout::Lattice(lattice))?)
-    }
-
-    fn shapeless(&self) -> String {
-        format!("{}: expected a table or a BRDF that can be asked anywhere, found samples", self.name())
+        let lattice = layout(detect_symmetry(self.source.brdf()?))?;
+        Ok(self.source.measure(&Layout::Lattice(lattice))?)
     }
 }
 
-/// A fitted model, its table and how it compares.
+/// A fitted model, its table and its metrics.
 #[derive(Debug)]
 pub(super) struct Fitted {
     pub(super) model: Model,
@@ -138,10 +132,10 @@ impl Context {
         self.only.is_empty() || self.only.iter().any(|only| only == name)
     }
 
-    /// The paper's materials: the user's MERL files where there are some, else reconstructions.
+    /// The paper's materials: the user's MERL files as far as they are there, else reconstructions.
     ///
     /// # Errors
-    /// `--materials` that names none of them.
+    /// If `--materials` names none of them.
     pub(super) fn paper_materials(&self) -> Result<Vec<Material<'_>>> {
         let of = |built_in: &'_ Source| {
             self.measured.iter().find(|s| s.name == built_in.name && s.kind.contains("MERL"))
@@ -166,7 +160,7 @@ impl Context {
     /// The measurements of `--data`, or the paper's materials without any.
     ///
     /// # Errors
-    /// `--materials` that names none of them.
+    /// If `--materials` names none of them.
     pub(super) fn all_materials(&self) -> Result<Vec<Material<'_>>> {
         let measured = self.measured.iter().filter(|source| self.wanted(&source.name));
         let mut found: Vec<_> = measured.map(|source| Material { source, origin: &source.kind }).collect();
@@ -183,19 +177,11 @@ impl Context {
 
     /// The largest number of samples whose dense fit with `terms` kernels keeps to the budget of time.
     pub(super) fn dense_samples(&self, terms: usize) -> usize {
-        let fits = |n: usize| {
-            let cost = dense_cost(n, 3, DENSE_EVALUATIONS * terms);
-            cost.seconds <= self.budget && cost.check().is_ok()
-        };
-        let (mut low, mut high) = (64, MAX_DENSE);
-        while low + 1 < high {
-            let middle = usize::midpoint(low, high);
-            if fits(middle) { low = middle } else { high = middle }
-        }
-        low
+        samples_within(self.budget, terms, MAX_DENSE)
     }
 
-    /// Fits a model to samples, bakes it and compares it with the truth; `interval` bakes sigma for the coverage.
+    /// Fits a model to samples, bakes it and compares it with the truth. With `interval` sigma is baked too,
+    /// for the coverage of the interval.
     pub(super) fn fit_and_compare(
         &self,
         truth: &BrdfTable,
@@ -204,7 +190,7 @@ impl Context {
         interval: bool,
     ) -> Result<Fitted> {
         let start = Instant::now();
-        let (model, _) = fit(samples, options, Provenance::default())?;
+        let model = fit(samples, options)?.model;
         self.compare(truth, model, start.elapsed().as_secs_f64(), interval)
     }
 
@@ -217,22 +203,18 @@ impl Context {
         interval: bool,
     ) -> Result<Fitted> {
         let mean = bake_mean(&model);
-        let metrics = if interval {
-            let (sigma, noise) = (bake_sigma(&model), model.noise_variances());
-            let of = |cell: usize| cell_interval(&model, noise, &mean, &sigma, cell);
-            Metrics::new(truth, &mean, &self.environment, Some(&of))?
-        } else {
-            Metrics::new(truth, &mean, &self.environment, None)?
-        };
+        let sigma = interval.then(|| bake_sigma(&model)).transpose()?;
+        let metrics = judge(truth, &model, &mean, sigma.as_ref(), &self.environment)?;
         Ok(Fitted { model, mean, metrics, fit_seconds })
     }
 }
 
-/// Every file under `folder` that is an RGL measurement or one of the 100 published MERL tables, sorted by name.
+/// Every file under `folder` that is an RGL measurement or one of the 100 published MERL tables, sorted by
+/// name.
 ///
 /// # Errors
-/// A folder that cannot be read or holds none, or a damaged file.
-pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Source>> {
+/// If the folder cannot be read or holds none, or a file is damaged.
+pub(crate) fn measurements(folder: &Path, observer: &dyn Observer) -> Result<Vec<Source>> {
     let mut files = Vec::new();
     collect(folder, &mut files, 0)?;
     files.sort();
@@ -240,8 +222,8 @@ pub(super) fn measurements(folder: &Path, terminal: &Terminal) -> Result<Vec<Sou
     for file in files {
         let extension = file.extension().map(|e| e.to_ascii_lowercase());
         let merl = extension.as_deref().is_some_and(|e| e == "binary");
-        if merl && gpbrdf_core::merl_material_name(&gpbrdf_core::sha256_file(&file)?).is_none() {
-            terminal.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
+        if merl && merl_material_name(&sha256_file(&file)?).is_none() {
+            observer.warn(&format!("\"{}\" is none of the published MERL files: left out", file.display()));
             continue;
         }
         if merl || extension.as_deref().is_some_and(|e| e == "bsdf") {

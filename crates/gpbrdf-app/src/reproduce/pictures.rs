@@ -1,15 +1,15 @@
 //! Figures 3, 4 and 5: spheres, slices and the distribution of the pixel difference.
 
 use anyhow::Result;
-use gpbrdf_core::{
-    FitOptions, Image, PixelDifference, SliceOptions, render_env, render_point, slice_figure, sphere_figure,
-};
+use gpbrdf_core::FitOptions;
+use gpbrdf_core::figure::{SliceOptions, slice_figure, sphere_figure};
+use gpbrdf_core::judge::{Image, PixelDifference, render_env, render_point};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
-use super::materials::PAPER_SAMPLES;
 use super::plot::{Axis, Curve};
 use super::table::{Table, number};
+use crate::job::PAPER_SAMPLES;
 
 /// Points of a curve of the distribution.
 const STEPS: usize = 200;
@@ -37,7 +37,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         let samples = material.lattice_samples(PAPER_SAMPLES)?;
         let fitted = context.fit_and_compare(&truth, &samples, &FitOptions::default(), false)?;
         let tables = [&*truth, &fitted.mean];
-        let slice = slice_figure(name, Some(&*truth), &fitted.mean, None, &SliceOptions::default())?;
+        let slice = slice_figure(name, Some(&*truth), &fitted.mean, &SliceOptions::default())?;
         outcome.picture(format!("figure4-slice-{name}.png"), &slice)?;
         let lights = [
             ("environment", render_env(&tables, &context.environment, size)),
@@ -45,7 +45,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         ];
         for (light, images) in lights {
             let [a, b] = &images[..] else { continue };
-            let picture = sphere_figure(&format!("{name}, {light}"), Some(a), b, None, None)?;
+            let picture = sphere_figure(&format!("{name}, {light}"), Some(a), b, None)?;
             outcome.picture(format!("figure5-{light}-{name}.png"), &picture)?;
             let found = PixelDifference::new(a, b)?;
             table.rows.push(vec![
@@ -70,8 +70,8 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(
-        "The paper finds the difference below 5 % under its point light, on pictures of its own scene. Figures 3 and 5 are spheres \
-         here; figure 4 shows slices at phi_d = 90 degrees.",
+        "The paper finds the difference below 5 % under its point light, on pictures of its own scene. \
+         Figures 3 and 5 are spheres here; figure 4 shows slices at phi_d = 90 degrees.",
     );
     let x = Axis { name: "|1 - b / a|, point light", logarithmic: true };
     let y = Axis { name: "share of pixels below", logarithmic: false };

@@ -3,22 +3,22 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::cli::report::significant;
+use gpbrdf_core::base::number::significant;
 
 /// Rows of names and numbers under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Table {
+pub(crate) struct Table {
     /// Part of the file's name.
     pub(super) name: String,
     /// What the table shows.
     pub(super) title: String,
     pub(super) columns: Vec<String>,
     pub(super) rows: Vec<Vec<Value>>,
-    /// What a reader has to know.
+    /// Remarks below the table.
     pub(super) notes: Vec<String>,
 }
 
-/// A number; as text where JSON has none for it.
+/// A number as JSON; infinities and NaN become text, as JSON has no numbers for them.
 pub(super) fn number(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { json!(x.to_string()) }
 }
@@ -37,7 +37,7 @@ impl Table {
         self.notes.push(note.into());
     }
 
-    /// For each value of the column `by` that several rows have, a row of the means of their numbers; text is left out.
+    /// Adds a row of means for each value of the column `by` that several rows share; their text is left out.
     pub(super) fn add_means(&mut self, by: usize) {
         let mut groups: Vec<(Value, Vec<usize>)> = Vec::new();
         for (i, row) in self.rows.iter().enumerate() {
@@ -65,8 +65,8 @@ impl Table {
         }
     }
 
-    /// Four digits of each number, for people.
-    pub(super) fn markdown(&self) -> String {
+    /// The table for people, with four digits of each number.
+    pub(crate) fn markdown(&self) -> String {
         let mut out = format!("## {}\n\n", self.title);
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         out.push_str(&line(&self.columns));
@@ -80,7 +80,7 @@ impl Table {
         out
     }
 
-    /// All digits.
+    /// The table for programs, with all digits.
     pub(super) fn csv(&self) -> String {
         let quoted = |text: &str| {
             if text.contains([',', '"', '\n']) {
@@ -105,7 +105,7 @@ fn shown(value: &Value) -> String {
         Value::Null => String::new(),
         Value::String(text) => text.clone(),
         Value::Number(n) if n.is_u64() => n.to_string(),
-        Value::Number(n) => n.as_f64().map_or_else(String::new, significant),
+        Value::Number(n) => n.as_f64().map_or_else(String::new, |x| significant(x, 4)),
         other => other.to_string(),
     }
 }

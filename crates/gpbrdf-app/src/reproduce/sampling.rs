@@ -1,7 +1,8 @@
 //! Figure 2: error and time of the fit against the sampling rate.
 
 use anyhow::Result;
-use gpbrdf_core::{FitOptions, Layout, N_CELLS, SampleSet, Solver};
+use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::{FitOptions, Layout, SampleSet, Solver};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
@@ -15,7 +16,7 @@ const QUICK_RATES: [f64; 4] = [0.05, 0.2, 1.0, 2.58];
 
 const MEASURES: [Measure; 4] = [MAE, MSE, MEDIAN_LN, PSNR_ENV];
 
-/// Of all cells of a table, `rate` percent.
+/// The number of cells that are `rate` percent of a table.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rates are in 0 to 10")]
 fn samples_of(rate: f64) -> usize {
     (rate / 100.0 * N_CELLS as f64).round() as usize
@@ -64,8 +65,9 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         }
     }
     table.note(format!(
-        "Rates are of all 1,458,000 cells, as in the paper. The dense solver stops at {most} samples, the most that a budget of {} s \
-         is expected to hold. Both fit ln(f + 0.001) by a Matern 5/2 kernel; times are those of this machine.",
+        "Rates are of all 1,458,000 cells, as in the paper. The dense solver stops at {most} samples, the \
+         most that a budget of {} s is expected to hold. Both fit ln(f + 0.001) by a Matern 5/2 kernel; \
+         times are those of this machine.",
         context.budget
     ));
     let mut outcome = Outcome::default();

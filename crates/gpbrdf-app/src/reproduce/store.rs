@@ -1,17 +1,17 @@
-//! Results on disk: written together, and found again by a later run.
+//! Results on disk: the files of an experiment are written together, and a later run finds them again.
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::context::Outcome;
 use super::table::Table;
-use crate::cli::input::OutputFolder;
+use crate::output::OutputFolder;
 
 /// `NAME.json`: an experiment's tables, what they depend on, and the files beside it.
 #[derive(Debug, Deserialize, Serialize)]
@@ -24,7 +24,7 @@ struct Record {
 }
 
 /// Whether `folder` holds the result of an experiment of this key, with all its files.
-pub(super) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
+pub(crate) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
     let Ok(text) = fs::read_to_string(folder.join(format!("{name}.json"))) else { return false };
     let Ok(record) = serde_json::from_str::<Record>(&text) else { return false };
     record.experiment == name
@@ -32,11 +32,11 @@ pub(super) fn is_done(folder: &Path, name: &str, key: &Value) -> bool {
         && record.files.iter().all(|file| folder.join(file).is_file())
 }
 
-/// Writes all files of an experiment, or none; their number.
+/// Writes all files of an experiment, or none, and returns how many there are.
 ///
 /// # Errors
-/// A folder or file that cannot be written.
-pub(super) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcome: Outcome) -> Result<usize> {
+/// If a folder or file cannot be written.
+pub(crate) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcome: Outcome) -> Result<usize> {
     let target = OutputFolder::create(folder)?;
     let mut contents: Vec<(String, Vec<u8>)> = outcome.figures;
     for table in &outcome.tables {
@@ -51,7 +51,7 @@ pub(super) fn write(folder: &Path, name: &str, key: &Value, seconds: f64, outcom
         tables: outcome.tables,
         files: contents.iter().map(|(file, _)| file.clone()).collect(),
     };
-    // The record last: where it stands, the rest does.
+    // The record comes last, so that the other files are there where it is.
     let mut json = serde_json::to_vec_pretty(&record)?;
     json.push(b'\n');
     contents.push((format!("{name}.json"), json));

@@ -1,29 +1,20 @@
 //! `gpbrdf-cli reproduce`: the paper's experiments, each a table and pictures.
 
-mod beyond;
-mod context;
-mod hemisphere;
-mod kernels;
-mod materials;
-mod measures;
-mod paper_lattice;
-mod pictures;
-mod plot;
-mod sampling;
-mod store;
-mod table;
-
 use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use clap::{Args, ValueEnum};
-use gpbrdf_core::{Source, materials as built_in_materials, read_neural_csv, sha256_file};
+use clap::Args;
+use gpbrdf_core::Source;
+use gpbrdf_core::brdf::materials as built_in_materials;
+use gpbrdf_core::formats::{read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
-use super::input::{OutputFolder, environment};
+use super::input::environment;
 use super::terminal::Terminal;
-use context::{Context, Outcome, measurements};
+use crate::job::Observer;
+use crate::output::OutputFolder;
+use crate::reproduce::{Context, Experiment, PAPER_MATERIALS, measurements, store};
 
 #[derive(Args, Debug)]
 pub(crate) struct Reproduce {
@@ -39,100 +30,19 @@ pub(crate) struct Reproduce {
     /// Only these materials, by name.
     #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
     materials: Vec<String>,
-    /// Weights of Neural BRDF fits to compare with, 675 a material.
+    /// CSV file with the weights of Neural BRDF fits to compare with, 675 per material.
     #[arg(long, value_name = "FILE")]
     nbrdf: Option<PathBuf>,
     /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
-    /// Seconds that one dense fit may be expected to take; decides its number of samples. [default: 60, or 1 with
-    /// --quick]
+    /// Seconds that one dense fit may be expected to take; decides its number of samples.
+    /// [default: 60, or 1 with --quick]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     budget: Option<f64>,
-    /// Folder for the outputs; what it holds already of the same options is not computed again.
+    /// Folder for the outputs. Experiments whose results of the same options it holds are not run again.
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
     output: PathBuf,
-}
-
-/// The experiments, in the order of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Experiment {
-    /// Analytic models under one light (figure 1 with it).
-    Table1,
-    /// Error and time against the sampling rate.
-    Figure2,
-    /// The paper's materials.
-    Table2,
-    /// Kernels.
-    Table3,
-    /// Spheres, slices and pixel differences.
-    Figures345,
-    /// Neural BRDF, sampling curve, calibration.
-    Beyond,
-}
-
-impl Experiment {
-    const ALL: [Self; 6] =
-        [Self::Table1, Self::Figure2, Self::Table2, Self::Table3, Self::Figures345, Self::Beyond];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Table1 => "table1",
-            Self::Figure2 => "figure2",
-            Self::Table2 => "table2",
-            Self::Table3 => "table3",
-            Self::Figures345 => "figures345",
-            Self::Beyond => "beyond",
-        }
-    }
-
-    fn run(self, context: &Context) -> Result<Outcome> {
-        match self {
-            Self::Table1 => hemisphere::run(context),
-            Self::Figure2 => sampling::run(context),
-            Self::Table2 => materials::run(context),
-            Self::Table3 => kernels::run(context),
-            Self::Figures345 => pictures::run(context),
-            Self::Beyond => beyond::run(context),
-        }
-    }
-
-    /// Expected seconds, within a factor of three on a machine of two cores: dense fits take their budget and, to bake,
-    /// half of it again; a lattice fit with table, pictures and metrics takes some seconds.
-    fn seconds(self, context: &Context) -> f64 {
-        const LATTICE: f64 = 4.0;
-        let dense = 1.5 * context.budget + LATTICE;
-        let paper = context::PAPER_MATERIALS.len() as f64;
-        let paper = if context.only.is_empty() { paper } else { paper.min(context.only.len() as f64) };
-        let all = if context.measured.is_empty() { paper } else { context.measured.len() as f64 };
-        let quick = context.quick;
-        match self {
-            Self::Table1 => {
-                if quick {
-                    8.0
-                } else {
-                    90.0
-                }
-            }
-            Self::Figure2 => {
-                if quick {
-                    4.0 * LATTICE + 1.5 * dense
-                } else {
-                    12.0 * LATTICE + 2.0 * dense
-                }
-            }
-            Self::Table2 => paper * (dense + LATTICE),
-            Self::Table3 => 6.0 * (dense + 2.0 * LATTICE),
-            Self::Figures345 => paper * LATTICE * if quick { 1.0 } else { 3.0 },
-            Self::Beyond => {
-                if quick {
-                    2.0 * 7.0 * LATTICE
-                } else {
-                    all * 10.0 * LATTICE
-                }
-            }
-        }
-    }
 }
 
 impl Reproduce {
@@ -159,7 +69,7 @@ impl Reproduce {
             environment: environment(self.env.as_deref())?,
             only: self.materials.clone(),
             neural: self.nbrdf.as_deref().map_or(Ok(Vec::new()), read_neural_csv)?,
-            built_in: context::PAPER_MATERIALS.into_iter().map(Source::built_in).collect::<Result<_, _>>()?,
+            built_in: PAPER_MATERIALS.into_iter().map(Source::built_in).collect::<Result<_, _>>()?,
             measured,
         };
         let key = self.key(&context)?;
@@ -196,7 +106,7 @@ impl Reproduce {
         Ok(())
     }
 
-    /// What results depend on: options and the sums of the inputs.
+    /// What the results depend on: the options and the checksums of the inputs.
     fn key(&self, context: &Context) -> Result<Value> {
         let sum = |file: &Option<PathBuf>| file.as_ref().map(sha256_file).transpose();
         let measured: Vec<&str> = context.measured.iter().map(|s| s.sha256.as_str()).collect();

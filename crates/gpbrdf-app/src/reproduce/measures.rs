@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use super::table::number;
 
-/// A column's name, and its value where there is one.
+/// The name of a column and its value, if there is one.
 pub(super) type Measure = (&'static str, fn(&Metrics) -> Option<f64>);
 
 pub(super) const MAE: Measure = ("MAE", |m| Some(m.cells.mae));
@@ -19,7 +19,7 @@ pub(super) const RMS_LN: Measure = ("rms ln", |m| Some(m.cells.log_rmse));
 pub(super) const LN_COS: Measure = ("ln(1 + f cos)", |m| Some(m.cells.log1p_cos_l1));
 pub(super) const COVERAGE: Measure = ("coverage 95 %", |m| m.cells.coverage_95);
 
-/// Names of columns: those before, the measures, those after.
+/// The names of columns: those before the measures, the measures themselves, and those after them.
 pub(super) fn columns(
     before: &[&'static str],
     measures: &[Measure],

@@ -1,4 +1,4 @@
-//! Curves as SVG, with text as text: no font is needed to write one.
+//! Curves as SVG files. Their text stays text, so no font is needed to write them.
 
 use anyhow::{Result, anyhow};
 use plotters::prelude::{
@@ -7,7 +7,7 @@ use plotters::prelude::{
 };
 use plotters::style::Color;
 
-use crate::cli::report::significant;
+use gpbrdf_core::base::number::short;
 
 /// Named points, joined by a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl Axis<'_> {
         if self.logarithmic { x.log10() } else { x }
     }
 
-    /// A number at a mark; two digits are enough between the marks of a logarithmic scale.
+    /// The number at a mark. Two digits are enough to tell the marks of a logarithmic scale apart.
     fn label(&self, at: f64) -> String {
         if self.logarithmic {
             let x = 10f64.powf(at);
@@ -38,16 +38,11 @@ impl Axis<'_> {
             let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
             return format!("{rounded}");
         }
-        let digits = significant(if at.abs() < 1e-12 { 0.0 } else { at });
-        if digits.contains('.') && !digits.contains('e') {
-            digits.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            digits
-        }
+        short(if at.abs() < 1e-12 { 0.0 } else { at }, 4)
     }
 }
 
-/// Colours that are told apart in grey too.
+/// Colours that can be told apart in grey, too.
 const COLOURS: [RGBColor; 8] = [
     RGBColor(31, 78, 160),
     RGBColor(214, 96, 30),
@@ -65,10 +60,10 @@ const LEGEND: i32 = 230;
 /// Height of a line of the legend.
 const LINE: i32 = 22;
 
-/// The curves in one frame, with a legend beside it. Points that a scale cannot show are left out.
+/// Draws the curves in one frame with a legend beside it. Points that a scale cannot show are left out.
 ///
 /// # Errors
-/// Those of the drawing backend.
+/// If the drawing backend fails.
 pub(super) fn curves(title: &str, x: Axis<'_>, y: Axis<'_>, curves: &[Curve]) -> Result<String> {
     let placed: Vec<Vec<(f64, f64)>> = curves
         .iter()

@@ -1,0 +1,35 @@
+//! One job for both programs: measure a source, fit a model to it, bake the model and judge the result.
+//!
+//! [`ModelSpec`] says how to measure and what to fit; it is read from a command line by clap and from a
+//! session of the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results.
+//! [`Report`] is what the command line says about a run, to machines and to people.
+
+#![allow(dead_code, unused_imports, reason = "the viewer's half is not joined yet")]
+
+mod backend;
+mod choices;
+mod compression;
+mod forecast;
+#[cfg(feature = "viewer")]
+mod hyper;
+mod judge;
+mod kernels;
+mod report;
+mod run;
+mod sample;
+mod spec;
+mod stage;
+
+pub(crate) use backend::Backend;
+pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
+pub(crate) use compression::Compression;
+pub(crate) use forecast::samples_within;
+#[cfg(feature = "viewer")]
+pub(crate) use hyper::hyper_sliders;
+pub(crate) use judge::judge;
+pub(crate) use kernels::Kernels;
+pub(crate) use report::{Report, metric_lines};
+pub(crate) use run::{Baked, Baking, Fitted, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
+pub(crate) use sample::{Measured, SampleKey};
+pub(crate) use spec::{ModelSpec, PAPER_SAMPLES};
+pub(crate) use stage::{Seconds, Stage};
