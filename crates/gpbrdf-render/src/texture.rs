@@ -158,9 +158,7 @@ impl BrdfTexture {
     pub fn to_tables(&self, context: &Context) -> Result<(BrdfTable, SigmaTable)> {
         let (mean, sigma): (Vec<[f32; 3]>, Vec<f32>) =
             self.download(context)?.into_iter().map(|[r, g, b, sigma]| ([r, g, b], sigma)).unzip();
-        let cells = mean.len();
-        let tables = BrdfTable::from_values(mean).zip(SigmaTable::from_planes(vec![sigma]));
-        tables.ok_or_else(|| Error::argument("texels of a BRDF", N_CELLS.to_string(), cells))
+        Ok((BrdfTable::from_values(mean)?, SigmaTable::from_planes(vec![sigma])?))
     }
 
     /// The view that shaders bind.
