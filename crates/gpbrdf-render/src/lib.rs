@@ -5,8 +5,7 @@
 //! ```
 //! use std::ops::ControlFlow;
 //!
-//! use gpbrdf_core::{Environment, FitOptions, LatticeLayout, Layout, Provenance};
-//! use gpbrdf_core::{SampleSet, Source, Symmetry, fit};
+//! use gpbrdf_core::{Environment, FitOptions, LatticeLayout, Layout, Source, Symmetry, fit};
 //! use gpbrdf_render::{AdapterChoice, Baker, Context, Precision};
 //! use gpbrdf_render::{Display, Geometry, Light, Mesh, Renderer};
 //!
@@ -15,10 +14,9 @@
 //! #     return Ok(eprintln!("skipped: {error}"));
 //! # }
 //! let source = Source::built_in("red-plastic")?;
-//! # let Some(brdf) = source.brdf() else { return Ok(()) };
 //! let layout = LatticeLayout::with_samples(500, Symmetry::Bilateral)?;
-//! let samples = SampleSet::measure(brdf, &Layout::Lattice(layout))?;
-//! let (model, _report) = fit(&samples, &FitOptions::default(), Provenance::default())?;
+//! let samples = source.measure(&Layout::Lattice(layout))?;
+//! let model = fit(&samples, &FitOptions::default())?.model;
 //!
 //! let context = Context::open(AdapterChoice::Any)?; // or Context::from_device
 //! let baker = Baker::new(&context)?;

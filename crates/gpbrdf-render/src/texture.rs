@@ -5,7 +5,7 @@ use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// How a texture stores its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

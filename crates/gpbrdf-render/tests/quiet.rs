@@ -52,9 +52,9 @@ impl log::Log for Logger {
 
 fn fitted(layout: &Layout, options: FitOptions) -> Model {
     let source = Source::built_in("cherry-235").unwrap();
-    let samples = SampleSet::measure(source.brdf().unwrap(), layout).unwrap();
-    let options = FitOptions { space: LatticeLayout::default().space(), ..options };
-    fit(&samples, &options, Provenance::default()).unwrap().0
+    let samples = source.measure(layout).unwrap();
+    let options = FitOptions { space: LatticeLayout::default().space().into(), ..options };
+    fit(&samples, &options).unwrap().model
 }
 
 /// One model of each kind of process.
@@ -63,12 +63,12 @@ fn models() -> Vec<Model> {
     let scattered = Layout::Random { count: 24, seed: 3 };
     let table = BrdfTable::from_fn(|a| [0.1 + a.theta_h.cos().powi(40); 3]);
     let size = InducingSize::Shape([5, 4, 3]);
-    let options = TableFitOptions { size, ..TableFitOptions::default() };
+    let options = CompressOptions { size, ..CompressOptions::default() };
     vec![
         fitted(&lattice, FitOptions::default()),
         fitted(&lattice, FitOptions { per_channel: true, ..FitOptions::default() }),
         fitted(&scattered, FitOptions { solver: Solver::Dense, ..FitOptions::default() }),
-        fit_table(&table, &options, Provenance::default()).unwrap().0,
+        compress(&table, &options, Provenance::default()).unwrap().model,
     ]
 }
 
@@ -87,7 +87,7 @@ fn bake_all(context: &Context, models: &[Model]) {
 }
 
 fn render_all(context: &Context, model: &Model) {
-    let (mean, sigma) = (bake_mean(model), bake_sigma(model));
+    let (mean, sigma) = (bake_mean(model), bake_sigma(model).unwrap());
     let prediction = BrdfTexture::upload(context, &mean, Some(&sigma), Precision::Half).unwrap();
     let truth = BrdfTexture::upload(context, &mean, None, Precision::Half).unwrap();
     let direction = [0.3, 0.2, 0.93, 0.0];

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use gpbrdf_core::{
     CompressOptions, FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance,
-    SampleSet, Shape, Solver, Source, Symmetry, Transform, bake_mean, bake_sigma, compress, fit,
+    Shape, Solver, Source, Symmetry, Transform, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{Baker, Context, Error, Precision};
 
@@ -32,8 +32,8 @@ fn keep_going() -> impl FnMut(f64) -> ControlFlow<()> {
 fn lattice_model(material: &str, shape: [usize; 3], symmetry: Symmetry, options: &FitOptions) -> Model {
     let source = Source::built_in(material).unwrap();
     let layout = LatticeLayout { shape, symmetry, ..LatticeLayout::default() };
-    let samples = SampleSet::measure(source.brdf().unwrap(), &Layout::Lattice(layout)).unwrap();
-    fit(&samples, options, Provenance::default()).unwrap().0
+    let samples = source.measure(&Layout::Lattice(layout)).unwrap();
+    fit(&samples, options).unwrap().model
 }
 
 /// The largest `|found - expected| / (expected + epsilon)` over the whole table, where `epsilon` is that of
@@ -43,7 +43,7 @@ fn errors(context: &Context, model: &Model, precision: Precision) -> (f64, f64) 
     let texture = baker.bake(model, precision, &mut keep_going()).unwrap();
     let found = texture.download(context).unwrap();
     let mean = bake_mean(model);
-    let sigma = bake_sigma(model);
+    let sigma = bake_sigma(model).unwrap();
     let mut worst = (0.0f64, 0.0f64);
     for (cell, (found, expected)) in found.iter().zip(mean.values()).enumerate() {
         for c in 0..3 {
@@ -59,7 +59,7 @@ fn errors(context: &Context, model: &Model, precision: Precision) -> (f64, f64) 
 fn lattice_bakes_are_the_core_s_for_every_kernel(context: &Context) {
     for (i, shape) in SHAPES.into_iter().chain([Shape::Matern { nu: 0.9 }]).enumerate() {
         let symmetry = if i % 2 == 0 { Symmetry::Bilateral } else { Symmetry::Reciprocal };
-        let options = FitOptions { kernel: vec![shape], ..FitOptions::default() };
+        let options = FitOptions::default().with_kernel(&[shape]);
         let model = lattice_model("cherry-235", [16, 9, 6], symmetry, &options);
         let (mean, sigma) = errors(context, &model, Precision::Single);
         eprintln!("{shape:?} {symmetry:?}: mean {mean:e}, sigma {sigma:e}");
@@ -77,12 +77,12 @@ fn the_default_lattice_bakes_in_both_precisions(context: &Context) {
 
 fn sums_separate_channels_and_transforms_bake_too(context: &Context) {
     let options = FitOptions {
-        kernel: vec![Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }],
         per_channel: true,
         transform: Transform::CubeRoot,
         mean: MeanFunction::Zero,
         ..FitOptions::default()
-    };
+    }
+    .with_kernel(&[Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }]);
     let model = lattice_model("red-plastic", [10, 8, 6], Symmetry::Reciprocal, &options);
     let (mean, sigma) = errors(context, &model, Precision::Single);
     assert!(mean < 1e-4 && sigma < 1e-3, "mean {mean:e}, sigma {sigma:e}");
@@ -95,8 +95,8 @@ fn inducing_lattices_bake_in_both_precisions(context: &Context) {
         (Symmetry::Reciprocal, Shape::Matern32, InducingSize::Shape([7, 4, 3])),
     ];
     for (symmetry, kernel, size) in cases {
-        let options = TableFitOptions { size, symmetry, kernel, ..TableFitOptions::default() };
-        let model = fit_table(&table, &options, Provenance::default()).unwrap().0;
+        let options = CompressOptions { size, symmetry, kernel, ..CompressOptions::default() };
+        let model = compress(&table, &options, Provenance::default()).unwrap().model;
         for (precision, limit) in [(Precision::Single, 1e-4), (Precision::Half, 1e-3)] {
             let (mean, sigma) = errors(context, &model, precision);
             eprintln!("inducing {symmetry:?} {precision:?}: mean {mean:e}, sigma {sigma:e}");
@@ -110,10 +110,10 @@ fn inducing_lattices_bake_in_both_precisions(context: &Context) {
 
 fn dense_model(n: usize, symmetry: Symmetry, options: FitOptions) -> Model {
     let source = Source::built_in("cherry-235").unwrap();
-    let samples = SampleSet::measure(source.brdf().unwrap(), &Layout::Random { count: n, seed: 7 }).unwrap();
+    let samples = source.measure(&Layout::Random { count: n, seed: 7 }).unwrap();
     let space = LatticeLayout { symmetry, ..LatticeLayout::default() }.space();
-    let options = FitOptions { solver: Solver::Dense, space, ..options };
-    fit(&samples, &options, Provenance::default()).unwrap().0
+    let options = FitOptions { solver: Solver::Dense, space: space.into(), ..options };
+    fit(&samples, &options).unwrap().model
 }
 
 /// The largest error of the mean, as in [`errors`].
@@ -137,19 +137,19 @@ fn dense_bakes_are_the_core_s_for_every_kernel(context: &Context) {
     }
     for (i, shape) in SHAPES.into_iter().enumerate() {
         let symmetry = if i % 2 == 0 { Symmetry::Bilateral } else { Symmetry::Reciprocal };
-        let model = dense_model(40, symmetry, FitOptions { kernel: vec![shape], ..FitOptions::default() });
+        let model = dense_model(40, symmetry, FitOptions::default().with_kernel(&[shape]));
         let error = dense_error(context, &model);
         assert!(error < 1e-4, "{shape:?} {symmetry:?}: {error:e}");
     }
     let sum = vec![Shape::Matern32, Shape::SquaredExponential];
-    let options = FitOptions { kernel: sum, per_channel: true, ..FitOptions::default() };
+    let options = FitOptions { per_channel: true, ..FitOptions::default() }.with_kernel(&sum);
     let error = dense_error(context, &dense_model(30, Symmetry::Bilateral, options));
     assert!(error < 1e-4, "sum of kernels: {error:e}");
 }
 
 fn what_has_no_shader_says_so_and_work_can_be_cancelled(context: &Context) {
     let baker = Baker::new(context).unwrap();
-    let options = FitOptions { kernel: vec![Shape::Matern { nu: 0.8 }], ..FitOptions::default() };
+    let options = FitOptions::default().with_kernel(&[Shape::Matern { nu: 0.8 }]);
     let model = dense_model(12, Symmetry::Bilateral, options);
     let error = baker.bake(&model, Precision::Half, &mut keep_going()).unwrap_err();
     assert!(matches!(error, Error::NoShader { .. }), "{error}");

@@ -168,10 +168,9 @@ fn sigma_is_weighted_by_light_and_pictures_show_what_was_asked_for(context: &Con
     let darker = BrdfTable::from_fn(|_| [0.18; 3]);
     let source = gpbrdf_core::Source::built_in("cherry-235").unwrap();
     let layout = gpbrdf_core::Layout::Random { count: 20, seed: 1 };
-    let samples = gpbrdf_core::SampleSet::measure(source.brdf().unwrap(), &layout).unwrap();
-    let (model, _) =
-        gpbrdf_core::fit(&samples, &gpbrdf_core::FitOptions::default(), Default::default()).unwrap();
-    let sigma: SigmaTable = gpbrdf_core::bake_sigma(&model);
+    let samples = source.measure(&layout).unwrap();
+    let model = gpbrdf_core::fit(&samples, &gpbrdf_core::FitOptions::default()).unwrap().model;
+    let sigma: SigmaTable = gpbrdf_core::bake_sigma(&model).unwrap();
     let prediction = BrdfTexture::upload(context, &darker, Some(&sigma), Precision::Half).unwrap();
     let mut renderer = Renderer::new(context, [24, 16]).unwrap();
     let black = renderer.read_display(&Display::default()).unwrap();
