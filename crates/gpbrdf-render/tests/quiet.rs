@@ -9,7 +9,7 @@ use std::sync::Mutex;
 
 use gpbrdf_core::{
     BrdfTable, CompressOptions, Environment, FitOptions, InducingSize, LatticeLayout, Layout, Model,
-    Provenance, SampleSet, Solver, Source, bake_mean, bake_sigma, compress, fit,
+    Provenance, Solver, Source, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{
     Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh, Precision, Renderer,
