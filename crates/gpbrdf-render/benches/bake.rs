@@ -1,4 +1,5 @@
-//! Baking on the device until the texture is written: a lattice model of 64 x 32 x 18 nodes and a dense model, both RGB.
+//! Baking on the device until the texture is written: a lattice model of 64 x 32 x 18 nodes and a dense
+//! model, both RGB.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::ops::ControlFlow;

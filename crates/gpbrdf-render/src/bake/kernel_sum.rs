@@ -34,7 +34,8 @@ fn check_single_precision(sum: &KernelSum<'_>) -> Result<()> {
         return Ok(());
     }
     let what = format!(
-        "this dense model on a device without f64: single precision would be off by {error:.0e} in target units"
+        "this dense model on a device without f64: single precision would be off by {error:.0e} in target \
+         units"
     );
     Err(Error::NoShader { what })
 }

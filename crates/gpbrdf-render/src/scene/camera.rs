@@ -104,8 +104,8 @@ impl Camera {
     /// Checks that the camera can take a picture.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] when a number is not finite, the eye is at the target, or an extent or
-    /// angle is outside of its domain.
+    /// [`gpbrdf_core::Error::InvalidArgument`] when a number is not finite, the eye is at the target, or an
+    /// extent or angle is outside of its domain.
     pub fn check(&self) -> Result<()> {
         let wrong = |expected: &str, found: String| Err(Error::argument("camera", expected, found));
         if !(self.eye.is_finite() && self.target.is_finite() && self.up.is_finite()) {

@@ -36,7 +36,8 @@ pub enum Show {
 impl Show {
     /// The end of the colour scale without a [`Display::limit`]. Sigma has 0.1, which is about 10 % of a BRDF
     /// whose logarithm is the target. The difference has 0.05, a twentieth of white; a picture that is off by
-    /// so much everywhere has a PSNR of 26 dB. Pictures that are not in false colours have 1, which is unused.
+    /// so much everywhere has a PSNR of 26 dB. Pictures that are not in false colours have 1, which is
+    /// unused.
     #[must_use]
     pub fn default_limit(self) -> f32 {
         match self {
@@ -126,7 +127,8 @@ impl Default for Display {
 }
 
 impl Display {
-    fn limit(&self) -> f32 {
+    /// The end of the colour scale.
+    fn scale_end(&self) -> f32 {
         self.limit.unwrap_or_else(|| self.show.default_limit())
     }
 
@@ -136,10 +138,10 @@ impl Display {
     /// [`gpbrdf_core::Error::InvalidArgument`] unless exposure and limit are positive and finite.
     pub fn check(&self) -> Result<()> {
         let positive = |x: f32| x > 0.0 && x.is_finite();
-        if positive(self.exposure) && positive(self.limit()) {
+        if positive(self.exposure) && positive(self.scale_end()) {
             return Ok(());
         }
-        let found = format!("{} and {}", self.exposure, self.limit());
+        let found = format!("{} and {}", self.exposure, self.scale_end());
         Err(Error::argument("display", "a positive exposure and limit", found))
     }
 }
@@ -245,7 +247,7 @@ fn uniform_of(display: &Display, shown: &Shown<'_>, size: [u32; 2]) -> gpu_types
         background,
         samples,
         exposure: display.exposure,
-        limit: display.limit(),
+        limit: display.scale_end(),
         split,
     }
 }

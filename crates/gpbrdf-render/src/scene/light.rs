@@ -43,7 +43,8 @@ impl Light {
     /// Checks that the light's numbers make sense.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] when a number is not finite, a direction is zero, or a light is negative.
+    /// [`gpbrdf_core::Error::InvalidArgument`] when a number is not finite, a direction is zero, or a light
+    /// is negative.
     pub fn check(&self) -> Result<()> {
         let wrong = |expected: &str, found: String| Err(Error::argument("light", expected, found));
         match self {
