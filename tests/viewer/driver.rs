@@ -139,7 +139,7 @@ impl Driver {
         self.texts().iter().find_map(|t| t.strip_prefix(start).map(str::to_owned))
     }
 
-    /// What a slider is at.
+    /// The value of a slider.
     pub(crate) fn value(&self, label: &str) -> f64 {
         let slider = self.harness.get_by_role_and_label(Role::Slider, label);
         slider.accesskit_node().numeric_value().unwrap()

@@ -4,10 +4,9 @@
 use std::ops::ControlFlow;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gpbrdf_core::{
-    FitOptions, InputSpace, LatticeLayout, Layout, Model, OptimizeOptions, Provenance, SampleSet, Solver,
-    Source, fit,
-};
+use gpbrdf_core::gp::OptimizeOptions;
+use gpbrdf_core::sample::InputSpace;
+use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Model, Provenance, SampleSet, Solver, Source, fit};
 use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision};
 
 fn model(layout: &Layout, solver: Solver) -> Option<Model> {

@@ -1,6 +1,7 @@
 //! A BRDF as a 3-D texture.
 
-use gpbrdf_core::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SigmaTable, cell_index};
+use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
 
 use crate::context::Context;
@@ -157,9 +158,7 @@ impl BrdfTexture {
     pub fn to_tables(&self, context: &Context) -> Result<(BrdfTable, SigmaTable)> {
         let (mean, sigma): (Vec<[f32; 3]>, Vec<f32>) =
             self.download(context)?.into_iter().map(|[r, g, b, sigma]| ([r, g, b], sigma)).unzip();
-        let cells = mean.len();
-        let tables = BrdfTable::from_values(mean).zip(SigmaTable::from_planes(vec![sigma]));
-        tables.ok_or_else(|| Error::argument("texels of a BRDF", N_CELLS.to_string(), cells))
+        Ok((BrdfTable::from_values(mean)?, SigmaTable::from_planes(vec![sigma])?))
     }
 
     /// The view that shaders bind.
@@ -198,7 +197,8 @@ impl BrdfTexture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gpbrdf_core::{Brdf as _, HalfDiff, direction};
+    use gpbrdf_core::brdf::direction;
+    use gpbrdf_core::{Brdf as _, HalfDiff};
 
     crate::support::gpu_tests![
         textures_come_back_as_they_were_sent,

@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 
 use gpbrdf_core::{
-    BrdfTable, Environment, FitOptions, InducingSize, LatticeLayout, Layout, Model, Provenance, SampleSet,
-    Solver, Source, TableFitOptions, bake_mean, bake_sigma, fit, fit_table,
+    BrdfTable, CompressOptions, Environment, FitOptions, InducingSize, LatticeLayout, Layout, Model,
+    Provenance, SampleSet, Solver, Source, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{
     Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh, Precision, Renderer,

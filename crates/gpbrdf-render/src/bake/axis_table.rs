@@ -1,6 +1,6 @@
 //! Functions of one coordinate as piecewise cubics.
 
-use gpbrdf_core::SeparableForm;
+use gpbrdf_core::gp::SeparableForm;
 
 use crate::gpu_types::narrow;
 

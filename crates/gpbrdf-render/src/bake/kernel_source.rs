@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use gpbrdf_core::{Kernel, KernelBody, Shape};
+use gpbrdf_core::Shape;
+use gpbrdf_core::kernel::{Kernel, KernelBody};
 
 use crate::error::{Error, Result};
 

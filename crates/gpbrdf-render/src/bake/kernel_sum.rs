@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use gpbrdf_core::{AxisMetric, DenseGp, Kernel, N_PHI_D, N_THETA_D, N_THETA_H, TableGeometry};
+use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H};
+use gpbrdf_core::gp::{KernelSum, TableGeometry};
+use gpbrdf_core::kernel::AxisMetric;
 use wgpu::BufferUsages;
 
 use super::kernel_source::KernelSource;
@@ -23,39 +25,18 @@ const SINGLE_ERROR: f64 = 3e-7;
 /// The error of a target above which single precision is refused.
 const LARGEST_ERROR: f64 = 1e-4;
 
-/// A process whose mean is a sum of kernel values over all samples: `sum_i kernel(x, x_i) w_i`.
-pub(super) struct KernelSum<'a> {
-    kernel: &'a Kernel,
-    /// `[sample][axis]`.
-    inputs: &'a [f64],
-    /// `[sample][channel]`.
-    weights: Vec<f64>,
-    channels: usize,
-}
-
-impl<'a> KernelSum<'a> {
-    pub(super) fn new(gp: &'a DenseGp) -> Self {
-        let (kernel, inputs) = (gp.kernel(), gp.inputs());
-        Self { kernel, inputs, weights: gp.weights(), channels: gp.channels() }
+/// Refuses weights that cancel too much for single precision: the error of a target is that of a kernel value
+/// times `sqrt(sum weights^2)`.
+fn check_single_precision(sum: &KernelSum<'_>) -> Result<()> {
+    let squares = sum.weights.iter().map(|w| w * w).sum::<f64>() / sum.n_channels as f64;
+    let error = SINGLE_ERROR * sum.kernel.prior_variance() * squares.sqrt();
+    if error <= LARGEST_ERROR {
+        return Ok(());
     }
-
-    fn n_samples(&self) -> usize {
-        self.inputs.len() / 3
-    }
-
-    /// Refuses weights that cancel too much for single precision: the error of a target is that of a kernel
-    /// value times `sqrt(sum weights^2)`.
-    fn check_single_precision(&self) -> Result<()> {
-        let squares = self.weights.iter().map(|w| w * w).sum::<f64>() / self.channels as f64;
-        let error = SINGLE_ERROR * self.kernel.prior_variance() * squares.sqrt();
-        if error <= LARGEST_ERROR {
-            return Ok(());
-        }
-        let what = format!(
-            "this dense model on a device without f64: single precision would be off by {error:.0e} in target units"
-        );
-        Err(Error::NoShader { what })
-    }
+    let what = format!(
+        "this dense model on a device without f64: single precision would be off by {error:.0e} in target units"
+    );
+    Err(Error::NoShader { what })
 }
 
 /// The compiled shaders, one for each kernel, by their source.
@@ -77,7 +58,7 @@ impl Pipelines {
         let double = context.f64_arithmetic();
         let kernel = KernelSource::new(process.kernel)?;
         if !double {
-            process.check_single_precision()?;
+            check_single_precision(process)?;
         }
         let [AxisMetric::Linear, AxisMetric::Linear, metric] = process.kernel.metric[..] else {
             return Err(Error::NoShader { what: format!("the metrics {:?}", process.kernel.metric) });
@@ -248,7 +229,7 @@ fn tables(geometry: &TableGeometry, kernel: &KernelSource, chord: bool) -> Vec<[
 
 /// Samples with their weights at the channels of the model from `first_channel` on.
 fn samples(process: &KernelSum<'_>, first_channel: usize, chord: bool) -> Vec<Sample> {
-    let rows = process.inputs.chunks(3).zip(process.weights.chunks(process.channels));
+    let rows = process.inputs.chunks(3).zip(process.weights.chunks(process.n_channels));
     rows.map(|(x, w)| {
         let [x2, x3] = third_coordinate(x[2], chord);
         let coordinates = [x[0], x[1], x2, x3].map(split);

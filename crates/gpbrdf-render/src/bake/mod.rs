@@ -1,7 +1,6 @@
 //! From a model to a texture, on the device.
 //!
-//! The shaders know two forms of a process: a separable form and a kernel sum. [`parts`] is the only place
-//! that knows which processes have which form.
+//! The shaders know two forms of a process: a separable form and a kernel sum, as [`DeviceForm`] tells.
 
 mod axis_table;
 pub(crate) mod kernel_source;
@@ -11,20 +10,21 @@ mod targets;
 
 use std::ops::ControlFlow;
 
-use gpbrdf_core::{InputSpace, Model, Process, Transform};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart};
+use gpbrdf_core::sample::InputSpace;
+use gpbrdf_core::{Model, Transform};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::gpu_types::{Finish, TransformKind, narrow, to_u32};
 use crate::shader;
 use crate::texture::{BrdfTexture, Precision};
-use kernel_sum::KernelSum;
 use separable::{Placement, Separable};
 use targets::Targets;
 
 /// Bakes models on a device. The constructor compiles shaders, so keep the baker.
 ///
-/// - A lattice model is baked in its separable form ([`gpbrdf_core::SeparableForm`]): contracted along
+/// - A lattice model is baked in its separable form ([`gpbrdf_core::gp::SeparableForm`]): contracted along
 ///   `theta_h` and `phi_d`, then evaluated along `theta_d` from cubics. This works with every kernel, in
 ///   single precision, and gives sigma with the mean. A model of inducing lattices is the sum of three such
 ///   forms, each mixed into all channels.
@@ -59,35 +59,24 @@ enum Form<'a> {
 
 /// The parts of a model.
 fn parts(model: &Model) -> Result<Vec<Part<'_>>> {
-    let in_model_space = |form| Part { space: model.space, form };
-    Ok(match &model.process {
-        Process::Lattice(groups) => with_first_channel(groups, |gp| gp.data().channels)
-            .map(|(gp, first)| Form::Separable(Box::new(Separable::new(gp)), Placement::Channels { first }))
-            .map(in_model_space)
-            .collect(),
-        Process::Dense(groups) => with_first_channel(groups, |gp| gp.channels())
-            .map(|(gp, first)| Form::KernelSum(KernelSum::new(gp), first))
-            .map(in_model_space)
-            .collect(),
-        Process::Inducing(gp) => (0..)
-            .zip(&gp.components)
-            .map(|(k, component)| {
-                let placement = Placement::Mixed { colour: gp.mix.map(|row| row[k]) };
-                let form = Form::Separable(Box::new(Separable::new(component.gp())), placement);
-                Part { space: component.lattice().space, form }
-            })
-            .collect(),
-        _ => return Err(Error::NoShader { what: "this kind of process".to_owned() }),
-    })
-}
-
-/// Processes, each with the channel of the model at which its own channels begin.
-fn with_first_channel<T>(groups: &[T], channels: impl Fn(&T) -> usize) -> impl Iterator<Item = (&T, usize)> {
-    groups.iter().scan(0, move |next, gp| {
-        let first = *next;
-        *next += channels(gp);
-        Some((gp, first))
-    })
+    let mut parts = Vec::new();
+    for (first, posterior) in model.posteriors() {
+        match posterior.device_form() {
+            DeviceForm::Separable(summands) => {
+                for SeparablePart { gp, space, colour } in summands {
+                    let placement =
+                        colour.map_or(Placement::Channels { first }, |colour| Placement::Mixed { colour });
+                    let form = Form::Separable(Box::new(Separable::new(gp)?), placement);
+                    parts.push(Part { space: space.into(), form });
+                }
+            }
+            DeviceForm::KernelSum(sum) => {
+                parts.push(Part { space: sum.space, form: Form::KernelSum(sum, first) });
+            }
+            _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
+        }
+    }
+    Ok(parts)
 }
 
 impl Baker {
@@ -134,7 +123,7 @@ impl Baker {
         }
         let context = &self.context;
         let parts = parts(model)?;
-        let targets = Targets::new(context, model.space, &parts)?;
+        let targets = Targets::new(context, model.space(), &parts)?;
         let mut mixed = false;
         for (i, part) in parts.iter().enumerate() {
             let share = |done: f64| (i as f64 + done) / parts.len() as f64;

@@ -1,6 +1,7 @@
 //! The bake of a process in its separable form.
 
-use gpbrdf_core::{LatticeGp, N_THETA_H, SeparableForm, TableGeometry};
+use gpbrdf_core::brdf::N_THETA_H;
+use gpbrdf_core::gp::{LatticeGp, SeparableForm, TableGeometry};
 use wgpu::BufferUsages;
 
 use super::axis_table::AxisTable;
@@ -21,12 +22,12 @@ pub(super) struct Separable<'a> {
 }
 
 impl<'a> Separable<'a> {
-    pub(super) fn new(gp: &'a LatticeGp) -> Self {
-        Self {
-            form: SeparableForm::new(gp),
+    pub(super) fn new(gp: &'a LatticeGp) -> Result<Self> {
+        Ok(Self {
+            form: SeparableForm::new(gp)?,
             nodes: &gp.data().coordinates[1],
             signal_variance: gp.hyper().signal_variance,
-        }
+        })
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::borrow::Cow;
 
-use gpbrdf_core::{InputSpace, N_PHI_D, N_THETA_D, N_THETA_H, TableGeometry};
+use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H};
+use gpbrdf_core::gp::TableGeometry;
+use gpbrdf_core::sample::InputSpace;
 
 use super::separable::Placement;
 use super::{Form, Part};

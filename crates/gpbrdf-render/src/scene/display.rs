@@ -1,7 +1,7 @@
 //! From running sums of radiance to a picture for the eye.
 
 use bytemuck::NoUninit;
-use gpbrdf_core::Colormap;
+use gpbrdf_core::figure::Colormap;
 
 use super::shade::EnvironmentBuffers;
 use crate::context::Context;

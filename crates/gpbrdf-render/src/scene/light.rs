@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::Vec3;
-use gpbrdf_core::{EnvDirection, Environment, POINT_LIGHT};
+use gpbrdf_core::Environment;
+use gpbrdf_core::judge::{EnvDirection, POINT_LIGHT};
 
 use super::colour::luminance;
 use crate::error::{Error, Result};
@@ -30,7 +31,7 @@ pub enum Light {
 }
 
 impl Light {
-    /// The light of the image metrics, `gpbrdf_core::render_point`: white, from [`POINT_LIGHT`], with an
+    /// The light of the image metrics, `gpbrdf_core::judge::render_point`: white, from [`POINT_LIGHT`], with an
     /// irradiance of pi.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "small constants")]

@@ -1,7 +1,7 @@
 //! The renderer of scenes, which a viewer shows or a program writes to files.
 
 use glam::Vec2;
-use gpbrdf_core::Image;
+use gpbrdf_core::judge::Image;
 
 use super::camera::Camera;
 use super::colour::luminance;

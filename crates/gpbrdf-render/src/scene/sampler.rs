@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use gpbrdf_core::N_THETA_H;
+use gpbrdf_core::brdf::N_THETA_H;
 
 use crate::context::Context;
 use crate::error::Result;

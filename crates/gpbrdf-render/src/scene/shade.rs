@@ -33,7 +33,7 @@ pub struct ShadingOptions {
     /// How directions of an environment are drawn.
     pub sampling: Sampling,
     /// Nothing is reflected where either cosine is smaller. Use 0 for physical pictures and
-    /// [`gpbrdf_core::MIN_COSINE`] to compare with the image metrics.
+    /// [`gpbrdf_core::brdf::GRAZING_COSINE`] to compare with the image metrics.
     pub min_cosine: f32,
     /// Whether the picture is moved by parts of a pixel between passes, which smooths edges. Otherwise every
     /// ray goes through the centre of its pixel, as in the image metrics.
@@ -51,12 +51,12 @@ impl Default for ShadingOptions {
 
 impl ShadingOptions {
     /// The options for pictures that are compared with the image metrics: rays through the centres of pixels,
-    /// [`gpbrdf_core::MIN_COSINE`] and lookups in full precision.
+    /// [`gpbrdf_core::brdf::GRAZING_COSINE`] and lookups in full precision.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "a small constant")]
     pub fn of_metrics() -> Self {
         Self {
-            min_cosine: gpbrdf_core::MIN_COSINE as f32,
+            min_cosine: gpbrdf_core::brdf::GRAZING_COSINE as f32,
             antialias: false,
             exact_lookup: true,
             ..Self::default()

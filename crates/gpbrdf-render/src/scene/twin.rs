@@ -1,7 +1,8 @@
 //! The shading shader again on the CPU, in f64: direct light, and environments by quadrature.
 
 use glam::Vec3;
-use gpbrdf_core::{BrdfTable, Environment, Rgb, ShadingFrame};
+use gpbrdf_core::judge::ShadingFrame;
+use gpbrdf_core::{BrdfTable, Environment, Rgb};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use gpbrdf_core::{
-    FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance, SampleSet, Shape,
-    Solver, Source, Symmetry, TableFitOptions, Transform, bake_mean, bake_sigma, fit, fit_table,
+    CompressOptions, FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance,
+    SampleSet, Shape, Solver, Source, Symmetry, Transform, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{Baker, Context, Error, Precision};
 

@@ -2,7 +2,8 @@
 
 use std::f32::consts::PI;
 
-use gpbrdf_core::{BrdfTable, Environment, SigmaTable, render_env, render_point};
+use gpbrdf_core::judge::{render_env, render_point};
+use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::twin::{TwinLight, shade_on_cpu};
 use gpbrdf_render::{
     Background, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
@@ -116,10 +117,12 @@ fn the_three_strategies_agree_with_quadrature(context: &Context) {
     let texels = renderer.gbuffer().download(context).unwrap();
     let environment = Environment::studio();
     let light = TwinLight::Patches { environment: &environment, patches: (192, 96) };
-    let fine = shade_on_cpu(&texels, &Camera::default(), light, &[&table], gpbrdf_core::MIN_COSINE).remove(0);
-    let coarse = TwinLight::Patches { environment: &environment, patches: gpbrdf_core::ENV_PATCHES };
+    let fine = shade_on_cpu(&texels, &Camera::default(), light, &[&table], gpbrdf_core::brdf::GRAZING_COSINE)
+        .remove(0);
+    let coarse = TwinLight::Patches { environment: &environment, patches: gpbrdf_core::judge::ENV_PATCHES };
     let coarse =
-        shade_on_cpu(&texels, &Camera::default(), coarse, &[&table], gpbrdf_core::MIN_COSINE).remove(0);
+        shade_on_cpu(&texels, &Camera::default(), coarse, &[&table], gpbrdf_core::brdf::GRAZING_COSINE)
+            .remove(0);
     let core = render_env(&[&table], &environment, 20).remove(0);
     let (worst, _) = gaps(core.pixels(), coarse.iter(), 1.0);
     assert!(worst < 1e-5, "the twin is not the core: {worst}");
@@ -193,7 +196,7 @@ fn sigma_is_weighted_by_light_and_pictures_show_what_was_asked_for(context: &Con
     assert!(gap > 0.01, "{gap}");
     for (limit, t) in [(0.5 * gap, 0.0), (2.0 * gap, 0.25)] {
         let display = Display { show: Show::Difference, limit: Some(limit), ..Display::default() };
-        let expected = gpbrdf_core::Colormap::Diverging.at(t);
+        let expected = gpbrdf_core::figure::Colormap::Diverging.at(t);
         let found = renderer.read_display(&display).unwrap()[middle];
         assert!(found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1), "{found:?} {expected:?}");
     }
