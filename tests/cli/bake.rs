@@ -80,7 +80,7 @@ fn writes_everything_and_reports_it() {
     // The three outputs are the same table, and it evaluates as reported.
     let binary = read_merl(cli.path("made/out/table.binary")).unwrap();
     assert_eq!(bits(&binary), bits(&read_table_exr(cli.path("made/out/table.exr")).unwrap()));
-    let model = Source::open(&cli.path("made/out/model.safetensors")).unwrap();
+    let model = Source::open(cli.path("made/out/model.safetensors")).unwrap();
     assert_eq!(bits(&binary), bits(&model.table().unwrap()));
     for output in ["table.binary", "table.exr", "model.safetensors"] {
         let evaluated = cli.json(&["eval", &format!("made/out/{output}"), "cherry-235", "--json"]);

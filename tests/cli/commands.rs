@@ -75,7 +75,7 @@ fn fitting_is_repeatable_and_predicting_is_the_library() {
                 HalfDiff::from_directions(&direction(a[0], a[1]), &direction(a[2], a[3]))
             })
             .collect();
-        let model = Model::load(&cli.path("a.safetensors")).unwrap();
+        let model = Model::load(cli.path("a.safetensors")).unwrap();
         let mut widths = Vec::new();
         for (flag, of) in [(None, IntervalOf::Observation), (Some("--latent"), IntervalOf::Latent)] {
             let arguments: Vec<&str> =
