@@ -138,7 +138,7 @@ fn object_files_and_maps_are_read_and_broken_ones_named() {
     std::fs::write(path("broken.obj"), "v 0 0\nf 1 2 9\n").unwrap();
     std::fs::write(path("broken.hdr"), "#?RADIANCE\nnothing").unwrap();
     let mut map = std::io::Cursor::new(Vec::new());
-    gpbrdf_core::write_image_exr(&mut map, 16, 8, &[[0.4, 0.5, 0.6]; 128]).unwrap();
+    gpbrdf_core::formats::write_image_exr(&mut map, 16, 8, &[[0.4, 0.5, 0.6]; 128]).unwrap();
     std::fs::write(path("sky.exr"), map.into_inner()).unwrap();
     let mut driver = object("\"shape\": \"Knot\"");
     driver.wait("a picture", |d| measured_samples(d) >= Some(1));

@@ -1,9 +1,11 @@
 //! What the model panel asks for: how to sample a source and which model to fit.
 
 use anyhow::{Result, bail};
+use gpbrdf_core::gp::dense_cost;
+use gpbrdf_core::kernel::ParameterKind;
 use gpbrdf_core::{
-    FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Noise, ParameterKind, SampleSet, Shape, Solver,
-    Source, Symmetry, Transform, dense_cost, detect_symmetry,
+    FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Noise, SampleSet, Shape, Solver, Source,
+    Symmetry, Transform, detect_symmetry,
 };
 use serde::{Deserialize, Serialize};
 
@@ -323,7 +325,8 @@ pub(crate) fn set_hyper_parameter(hyper: &mut Hyper, index: usize, value: f64) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gpbrdf_core::{Kernel1d, LatticeHyper};
+    use gpbrdf_core::gp::LatticeHyper;
+    use gpbrdf_core::kernel::Kernel1d;
 
     #[test]
     fn every_hyper_parameter_is_set_where_it_is_read() {

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use gpbrdf_core::{
-    CompressOptions, FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance,
-    Shape, Solver, Source, Symmetry, Transform, bake_mean, bake_sigma, compress, fit,
+    CompressOptions, FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance, Shape,
+    Solver, Source, Symmetry, Transform, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{Baker, Context, Error, Precision};
 

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use gpbrdf_core::{Source, materials};
+use gpbrdf_core::Source;
+use gpbrdf_core::brdf::materials;
 
 use super::{Event, Opened, Viewer};
 use crate::viewer::state::messages::naming;

@@ -4,10 +4,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use eframe::egui::Color32;
-use gpbrdf_core::{
-    Brdf, BrdfTable, CellMetrics, Content, FitReport, HalfDiff, Hyper, ImageMetrics, Model, Rgb, SampleSet,
-    Source,
-};
+use gpbrdf_core::judge::{CellMetrics, ImageMetrics};
+use gpbrdf_core::{Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Rgb, SampleSet, Source};
 
 use crate::viewer::spec::ModelSpec;
 

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use gpbrdf_core::{Rgb, SliceOptions};
+use gpbrdf_core::Rgb;
+use gpbrdf_core::figure::SliceOptions;
 use serde::{Deserialize, Serialize};
 
 /// The channels that are shown.

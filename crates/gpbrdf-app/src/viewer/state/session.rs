@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use eframe::egui::Color32;
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 use serde::{Deserialize, Serialize};
 
 use super::document::Document;

@@ -1,7 +1,7 @@
 //! The menus and the choice of views.
 
 use eframe::egui::{self, Button, Ui};
-use gpbrdf_core::materials;
+use gpbrdf_core::brdf::materials;
 
 use super::pane::Command;
 use super::shortcuts::{self, Action};

@@ -32,7 +32,7 @@ pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
 
 fn fit_ui(ui: &mut Ui, fitted: &Fitted) {
     let n = fitted.model.samples();
-    let share = 100.0 * n as f64 / gpbrdf_core::N_CELLS as f64;
+    let share = 100.0 * n as f64 / gpbrdf_core::brdf::N_CELLS as f64;
     ui.label(format!("{n} samples ({} % of a table)", short((100.0 * share).round() / 100.0)));
     ui.separator();
     let total = 1e3 * fitted.seconds.iter().sum::<f64>();

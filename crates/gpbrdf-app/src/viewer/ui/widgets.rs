@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::containers::menu::{MenuButton, MenuConfig};
 use eframe::egui::{self, ComboBox, Response, RichText, Slider, TextureHandle, Ui};
-use gpbrdf_core::Colormap;
+use gpbrdf_core::figure::Colormap;
 
 use crate::viewer::work::slices::colour;
 

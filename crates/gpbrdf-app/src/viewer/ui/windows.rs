@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use eframe::egui::{self, Context, RichText, Ui};
-use gpbrdf_core::materials;
+use gpbrdf_core::brdf::materials;
 
 use super::pane::Command;
 use super::shortcuts::{Action, MOUSE};

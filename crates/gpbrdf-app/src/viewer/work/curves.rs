@@ -3,7 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Rgb, Transform, Trilinear, direction, interval_95};
+use gpbrdf_core::brdf::{Trilinear, direction};
+use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Rgb, Transform, interval_95};
 use rayon::prelude::*;
 
 use super::mailbox::{Mailbox, Sender};

@@ -5,7 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use eframe::egui::Context;
-use gpbrdf_core::{AtomicFile, Picture, Rgb, Slice, slice_figure, sphere_figure, write_image_exr};
+use gpbrdf_core::Rgb;
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::figure::{Picture, Slice, slice_figure, sphere_figure};
+use gpbrdf_core::formats::write_image_exr;
 
 use super::outbox::{Outbox, in_background};
 use super::slices::Truth;

@@ -6,9 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::judge::CellMetrics;
 use gpbrdf_core::{
-    BrdfTable, CellMetrics, Content, Error, FitReport, Hyper, Model, N_CELLS, Provenance, SampleSet,
-    SigmaTable, Source, bake_mean, bake_sigma, condition, fit_per_axis, interval_95,
+    BrdfTable, Content, Error, FitReport, Hyper, Model, Provenance, SampleSet, SigmaTable, Source, bake_mean,
+    bake_sigma, condition, fit_per_axis, interval_95,
 };
 
 use super::outbox::Outbox;

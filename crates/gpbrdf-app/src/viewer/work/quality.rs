@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use gpbrdf_core::{psnr, ssim};
+use gpbrdf_core::judge::{psnr, ssim};
 use gpbrdf_render::LinearPicture;
 
 use super::mailbox::{Mailbox, Sender};

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage};
-use gpbrdf_core::{Brdf, BrdfTable, Colormap, Rgb, Slice, Source};
+use gpbrdf_core::figure::{Colormap, Slice};
+use gpbrdf_core::{Brdf, BrdfTable, Rgb, Source};
 
 use crate::viewer::state::document::{Document, DocumentId};
 use crate::viewer::state::look::{Channel, SliceLook};

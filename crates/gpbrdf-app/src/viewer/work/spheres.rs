@@ -5,10 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use eframe::egui::{Color32, ColorImage};
-use gpbrdf_core::{
-    BrdfTable, Colormap, DistantLight, ENV_PATCHES, Environment, Image, ImageMetrics, POINT_LIGHT,
-    SPHERE_SIZE, direction, environment_lights, exposure_of, psnr, render_sphere, ssim,
+use gpbrdf_core::brdf::direction;
+use gpbrdf_core::figure::Colormap;
+use gpbrdf_core::judge::{
+    DistantLight, ENV_PATCHES, Image, ImageMetrics, POINT_LIGHT, SPHERE_SIZE, environment_lights,
+    exposure_of, psnr, render_sphere, ssim,
 };
+use gpbrdf_core::{BrdfTable, Environment};
 
 use super::mailbox::{Mailbox, Sender};
 use super::outbox::Outbox;
@@ -227,7 +230,9 @@ fn mean_sigma(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> O
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
         let cosine = |l: &DistantLight| l.direction.x * x + l.direction.y * y + l.direction.z * z;
         let lit = white.iter().map(|l| (cosine(l), l.irradiance[0]));
-        lit.filter(|(cosine, _)| *cosine >= gpbrdf_core::MIN_COSINE).map(|(c, e)| c * e).sum::<f64>()
+        lit.filter(|(cosine, _)| *cosine >= gpbrdf_core::brdf::GRAZING_COSINE)
+            .map(|(c, e)| c * e)
+            .sum::<f64>()
     };
     let values: Vec<f64> = (0..COARSE * COARSE)
         .map(|i| {

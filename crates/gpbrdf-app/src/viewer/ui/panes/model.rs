@@ -331,7 +331,7 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
         );
         line(ui, "Sphere SSIM", ssim.map_or_else(dots, |x| format!("{x:.5}")), "Structural similarity");
         let cells = fitted.cells.as_ref();
-        let show = |f: &dyn Fn(&gpbrdf_core::CellMetrics) -> String| cells.map_or_else(dots, f);
+        let show = |f: &dyn Fn(&gpbrdf_core::judge::CellMetrics) -> String| cells.map_or_else(dots, f);
         line(
             ui,
             "Median error",

@@ -7,7 +7,8 @@ use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Align2, Color32, Context, RichText, TextureHandle, Ui, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotImage, PlotPoint, PlotUi, Points};
-use gpbrdf_core::{Brdf, Colormap, HalfDiff};
+use gpbrdf_core::figure::Colormap;
+use gpbrdf_core::{Brdf, HalfDiff};
 use serde::{Deserialize, Serialize};
 
 use crate::viewer::state::document::Document;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{self, Align2, Color32, Context, Rect, RichText, TextureHandle, Ui, pos2, vec2};
-use gpbrdf_core::Colormap;
+use gpbrdf_core::figure::Colormap;
 
 use super::{DIFFERENCE, Map, corners, sphere, square, whole_ui};
 use crate::viewer::state::document::{Document, DocumentId};
