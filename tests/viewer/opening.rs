@@ -68,7 +68,7 @@ fn dropped_files_are_opened_once_and_stay_among_the_recent_ones() {
         ..gpbrdf_core::CompressOptions::default()
     };
     let provenance = gpbrdf_core::Provenance { material: "squeezed".into(), ..Default::default() };
-    let (model, _) = gpbrdf_core::compress(&table, &options, provenance).unwrap();
+    let model = gpbrdf_core::compress(&table, &options, provenance).unwrap().model;
     std::fs::write(&path, model.to_bytes().unwrap()).unwrap();
 
     let mut driver = Driver::new(&[PathBuf::from("lambert")]);

@@ -58,7 +58,7 @@ fn hovered_values_are_those_of_the_model() {
             texts[at + 1].trim_end_matches('°').parse::<f64>().unwrap().to_radians()
         };
         let angles = HalfDiff { theta_h: angle("θh"), theta_d: angle("θd"), phi_d: angle("φd") };
-        let expected = model.predict(&[angles], IntervalOf::Observation)[0];
+        let expected = model.predict(&[angles], IntervalOf::Observation).unwrap()[0];
         let pairs = [
             ("truth", truth.brdf().unwrap().eval_half_diff(angles)),
             ("mean", expected.mean),

@@ -4,8 +4,6 @@
 //! session of the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results.
 //! [`Report`] is what the command line says about a run, to machines and to people.
 
-#![allow(dead_code, unused_imports, reason = "the viewer's half is not joined yet")]
-
 mod backend;
 mod choices;
 mod compression;
@@ -22,14 +20,15 @@ mod stage;
 
 pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
-pub(crate) use compression::Compression;
 pub(crate) use forecast::samples_within;
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
 pub(crate) use report::{Report, metric_lines};
-pub(crate) use run::{Baked, Baking, Fitted, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
-pub(crate) use sample::{Measured, SampleKey};
+#[cfg(feature = "viewer")]
+pub(crate) use run::is_cancelled;
+pub(crate) use run::{Baked, Baking, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
+pub(crate) use sample::Measured;
 pub(crate) use spec::{ModelSpec, PAPER_SAMPLES};
-pub(crate) use stage::{Seconds, Stage};
+pub(crate) use stage::Stage;

@@ -7,7 +7,6 @@
 //! its own worker.
 
 mod app;
-mod spec;
 mod state;
 mod ui;
 mod work;

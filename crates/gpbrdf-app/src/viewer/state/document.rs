@@ -7,7 +7,7 @@ use eframe::egui::Color32;
 use gpbrdf_core::judge::{CellMetrics, ImageMetrics};
 use gpbrdf_core::{Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Rgb, SampleSet, Source};
 
-use crate::viewer::spec::ModelSpec;
+use crate::job::{ModelSpec, Stage};
 
 /// Names a document for as long as the program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,8 +20,8 @@ pub(crate) struct Fitted {
     pub(crate) version: u64,
     pub(crate) model: Arc<Model>,
     pub(crate) samples: Arc<SampleSet>,
-    /// NaN where it is unknown, as for a model from a file.
-    pub(crate) log_marginal_likelihood: f64,
+    /// Unknown for a model from a file.
+    pub(crate) log_marginal_likelihood: Option<f64>,
     /// How the search went; `None` for hyper-parameters that were set by hand.
     pub(crate) report: Option<FitReport>,
     pub(crate) mean: Arc<BrdfTable>,
@@ -31,30 +31,6 @@ pub(crate) struct Fitted {
     pub(crate) images: Option<ImageMetrics>,
     /// Seconds to sample, fit and bake the mean.
     pub(crate) seconds: [f64; 3],
-}
-
-/// What the fitter does for a request, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stage {
-    Sampling,
-    Fitting,
-    BakingMean,
-    BakingSigma,
-    Tabulating,
-    Comparing,
-}
-
-impl Stage {
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Sampling => "Sampling",
-            Self::Fitting => "Fitting",
-            Self::BakingMean => "Baking the mean",
-            Self::BakingSigma => "Baking sigma",
-            Self::Tabulating => "Tabulating the truth",
-            Self::Comparing => "Comparing",
-        }
-    }
 }
 
 /// The state of the work on a document.
@@ -115,7 +91,7 @@ impl Document {
             visible: true,
             source: Arc::new(source),
             truth: None,
-            spec: ModelSpec::default(),
+            spec: ModelSpec::interactive(),
             requested: None,
             fitted: None,
             optimum: None,
@@ -126,7 +102,7 @@ impl Document {
     /// Whether the source can be evaluated at any direction, so that predictions can be compared with it:
     /// scattered samples and models cannot.
     pub(crate) fn source_is_truth(&self) -> bool {
-        matches!(self.source.content, Content::Table(_) | Content::Function(_))
+        matches!(self.source.content, Content::Table(_) | Content::Function { .. })
     }
 
     /// Whether the source is scattered measurements, which are all used.
@@ -161,7 +137,7 @@ impl Document {
     pub(crate) fn truth_at(&self, angles: HalfDiff) -> Option<Rgb> {
         match &self.truth {
             Some(table) => Some(table.eval_half_diff(angles)),
-            None if self.source_is_truth() => self.source.brdf().map(|brdf| brdf.eval_half_diff(angles)),
+            None if self.source_is_truth() => self.source.brdf().ok().map(|brdf| brdf.eval_half_diff(angles)),
             None => None,
         }
     }

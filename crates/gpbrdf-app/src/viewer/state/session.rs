@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::document::Document;
 use super::documents::Documents;
 use super::settings::Settings;
-use crate::viewer::spec::ModelSpec;
+use crate::job::ModelSpec;
 
 /// The value of `format` in every session file.
 const FORMAT: &str = "gpbrdf session";
@@ -101,14 +101,14 @@ mod tests {
         let mut documents = Documents::default();
         let document = documents.add(Source::built_in("ward").unwrap());
         document.name = "my wood".into();
-        document.spec.shape = [12, 10, 8];
+        document.spec.lattice = Some([12, 10, 8]);
         let session = Session::new(&documents, Settings::default());
         let path = folder.path().join("a.json");
         session.write(&path).unwrap();
         assert_eq!(Session::read(&path).unwrap(), session);
         let mut again = Document::new(DocumentId(3), Source::built_in("ward").unwrap());
         session.documents[0].clone().restore(&mut again);
-        assert_eq!((again.name.as_str(), again.spec.shape), ("my wood", [12, 10, 8]));
+        assert_eq!((again.name.as_str(), again.spec.shape()), ("my wood", [12, 10, 8]));
         std::fs::write(&path, "{\"format\": 3}").unwrap();
         let message = format!("{:#}", Session::read(&path).unwrap_err());
         assert!(message.contains("a.json"), "{message}");

@@ -19,7 +19,7 @@ pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
             }
             if let Work::Running { stage, .. } = &document.work {
                 ui.separator();
-                ui.label(stage.name());
+                ui.label(stage.label());
             }
         } else {
             ui.label("Nothing is open");
@@ -31,7 +31,7 @@ pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
 }
 
 fn fit_ui(ui: &mut Ui, fitted: &Fitted) {
-    let n = fitted.model.samples();
+    let n = fitted.model.n_samples();
     let share = 100.0 * n as f64 / gpbrdf_core::brdf::N_CELLS as f64;
     ui.label(format!("{n} samples ({} % of a table)", short((100.0 * share).round() / 100.0)));
     ui.separator();

@@ -196,17 +196,7 @@ pub(crate) fn short(x: f64) -> String {
     if !x.is_finite() {
         return if x > 0.0 { "∞".to_owned() } else { "–".to_owned() };
     }
-    if x == 0.0 {
-        return "0".to_owned();
-    }
-    let size = x.abs().log10().floor();
-    if !(-3.0..5.0).contains(&size) {
-        return format!("{x:.2e}");
-    }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 6")]
-    let digits = (3.0 - size).clamp(0.0, 6.0) as usize;
-    let text = format!("{x:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    gpbrdf_core::base::number::short(x, 4)
 }
 
 /// Rounds to the precision of the window.
@@ -226,8 +216,8 @@ mod tests {
             (1.0, "1"),
             (0.05, "0.05"),
             (12.345_6, "12.35"),
-            (1e-7, "1.00e-7"),
-            (123_456.0, "1.23e5"),
+            (1e-7, "1e-7"),
+            (123_456.0, "1.235e5"),
             (-0.25, "-0.25"),
             (f64::INFINITY, "∞"),
         ] {

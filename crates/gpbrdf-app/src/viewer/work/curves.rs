@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gpbrdf_core::brdf::{Trilinear, direction};
-use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Rgb, Transform, interval_95};
+use gpbrdf_core::brdf::direction;
+use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Model, Rgb};
 use rayon::prelude::*;
 
 use super::mailbox::{Mailbox, Sender};
@@ -63,13 +63,11 @@ fn factor(look: &CurveLook, angles: HalfDiff) -> f64 {
 /// The curve of a document; empty until it is fitted.
 pub(crate) fn curve(document: &Document, look: &CurveLook) -> Vec<CurvePoint> {
     let Some(fitted) = &document.fitted else { return Vec::new() };
-    let noise = fitted.model.noise_variances();
     let points = directions(look, 361).into_iter().map(|(x, angles)| {
         let scale = factor(look, angles);
         let mean = fitted.mean.eval_half_diff(angles);
         let truth = document.truth_at(angles);
-        let band =
-            fitted.sigma.as_ref().map(|sigma| band_at(fitted.model.transform, mean, sigma, noise, angles));
+        let band = fitted.sigma.as_ref().map(|sigma| band_at(&fitted.model, mean, sigma, angles));
         let value = |rgb: Rgb| scale * look.channel.of(rgb);
         CurvePoint {
             x,
@@ -81,18 +79,9 @@ pub(crate) fn curve(document: &Document, look: &CurveLook) -> Vec<CurvePoint> {
     points.collect()
 }
 
-/// The 95 % interval of a measurement, from the tables of mean and sigma.
-pub(crate) fn band_at(
-    transform: Transform,
-    mean: Rgb,
-    sigma: &BrdfTable,
-    noise: Rgb,
-    angles: HalfDiff,
-) -> (Rgb, Rgb) {
-    let sigma = sigma.lookup(&Trilinear::new(angles)).map(f64::from);
-    let ends: [(f64, f64); 3] =
-        std::array::from_fn(|c| interval_95(transform, mean[c], (sigma[c] * sigma[c] + noise[c]).sqrt()));
-    (ends.map(|e| e.0), ends.map(|e| e.1))
+/// The 95 % interval of a measurement about a mean, with sigma from its table.
+pub(crate) fn band_at(model: &Model, mean: Rgb, sigma: &BrdfTable, angles: HalfDiff) -> (Rgb, Rgb) {
+    model.interval_about(mean, sigma.eval_half_diff(angles))
 }
 
 /// The largest distance, in degrees, of the samples that are drawn with a curve.

@@ -6,16 +6,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use gpbrdf_core::brdf::N_CELLS;
+use anyhow::Result;
 use gpbrdf_core::judge::CellMetrics;
-use gpbrdf_core::{
-    BrdfTable, Content, Error, FitReport, Hyper, Model, Provenance, SampleSet, SigmaTable, Source, bake_mean,
-    bake_sigma, condition, fit_per_axis, interval_95,
-};
+use gpbrdf_core::{BrdfTable, Source};
 
 use super::outbox::Outbox;
-use crate::viewer::spec::{ModelSpec, SampleKey};
-use crate::viewer::state::document::{Document, DocumentId, Fitted, Stage, Work};
+use crate::job::{
+    Backend, Baking, Found, Job, Judging, Measured, ModelSpec, Observer, Progress, Run, Stage, Truth,
+    is_cancelled,
+};
+use crate::viewer::state::document::{Document, DocumentId, Fitted, Work};
 
 /// What the thread reports about a document.
 #[derive(Debug)]
@@ -51,14 +51,14 @@ impl News {
         match self {
             Self::Stage { stage, evaluations } if !cancelled => {
                 let since = match document.work {
-                    Work::Running { since, .. } if stage != Stage::Sampling => since,
+                    Work::Running { since, .. } if stage != Stage::Sample => since,
                     _ => Instant::now(),
                 };
                 document.work = Work::Running { stage, since, evaluations };
             }
             Self::Fitted(fitted) => {
                 if document.spec.hyper.is_none() {
-                    document.optimum = Hyper::of(&fitted.model);
+                    document.optimum = fitted.model.hyper();
                 }
                 document.fitted = Some(*fitted);
             }
@@ -117,18 +117,6 @@ struct Shared {
 #[derive(Debug)]
 pub(crate) struct Fitter {
     shared: Arc<Shared>,
-}
-
-/// Why a request ended early: it was cancelled, or there was an error, whose message contains its causes.
-enum Stop {
-    Cancelled,
-    Error(String),
-}
-
-impl From<Error> for Stop {
-    fn from(error: Error) -> Self {
-        if matches!(error, Error::Cancelled) { Self::Cancelled } else { Self::Error(error.to_string()) }
-    }
 }
 
 fn lock(shared: &Shared) -> MutexGuard<'_, Queue> {
@@ -194,16 +182,16 @@ impl Drop for Fitter {
 }
 
 /// Samples by document, kept while everything on which they depend stays the same.
-type Kept = HashMap<DocumentId, (SampleKey, Arc<SampleSet>)>;
+type Kept = Arc<Mutex<HashMap<DocumentId, Measured>>>;
 
 fn serve(shared: &Shared, outbox: &Outbox<Report>) {
-    let mut kept = Kept::new();
+    let kept = Kept::default();
     loop {
         let (request, cancel) = {
             let mut queue = lock(shared);
             loop {
                 for document in queue.forgotten.split_off(0) {
-                    kept.remove(&document);
+                    kept.lock().unwrap_or_else(PoisonError::into_inner).remove(&document);
                 }
                 if queue.quit {
                     return;
@@ -222,16 +210,18 @@ fn serve(shared: &Shared, outbox: &Outbox<Report>) {
             }
         };
         let document = request.document;
-        let result = run(&request, &cancel, &mut kept, outbox);
+        let follower = Follower::new(&request, cancel, Arc::clone(&kept), outbox.clone());
+        let result = run(&request, follower);
         let mut queue = lock(shared);
         let requeue = queue.running.take().is_some_and(|r| r.requeue);
         match result {
             Ok(()) => outbox.send(Report { document, news: News::Done }),
-            Err(Stop::Cancelled) if requeue && !queue.requests.iter().any(|r| r.document == document) => {
-                queue.requests.insert(0, request);
+            Err(error) if is_cancelled(&error) => {
+                if requeue && !queue.requests.iter().any(|r| r.document == document) {
+                    queue.requests.insert(0, request);
+                }
             }
-            Err(Stop::Cancelled) => {}
-            Err(Stop::Error(message)) => outbox.send(Report { document, news: News::Failed(message) }),
+            Err(error) => outbox.send(Report { document, news: News::Failed(format!("{error:#}")) }),
         }
     }
 }
@@ -239,142 +229,90 @@ fn serve(shared: &Shared, outbox: &Outbox<Report>) {
 /// The version of the next result.
 static VERSION: AtomicU64 = AtomicU64::new(1);
 
-fn run(request: &Request, cancel: &AtomicBool, kept: &mut Kept, outbox: &Outbox<Report>) -> Result<(), Stop> {
-    let document = request.document;
-    let cancelled = || cancel.load(Ordering::Relaxed);
-    let tell = |news: News| outbox.send(Report { document, news });
-    let begin = |stage: Stage| {
-        if cancelled() {
-            return Err(Stop::Cancelled);
-        }
-        tell(News::Stage { stage, evaluations: 0 });
-        Ok(())
+/// Does the job of a request; its results are reported as they come.
+fn run(request: &Request, follower: Follower) -> Result<()> {
+    let (source, spec) = (&request.source, &request.spec);
+    let measured = follower.measured();
+    let truth = request.truth.as_ref().map_or(Truth::Tabulated, |truth| Truth::Known(Arc::clone(truth)));
+    let job = Job {
+        measured,
+        keep_model: true,
+        baking: Some(Baking { backend: Backend::Cpu, sigma: true }),
+        truth,
+        judging: Judging::Cells,
+        ..Job::new(source, spec)
     };
-    let mut seconds = [0.0; 3];
-    let mut start = Instant::now();
-    let mut lap = |slot: usize| {
-        seconds[slot] = start.elapsed().as_secs_f64();
-        start = Instant::now();
-    };
-    begin(Stage::Sampling)?;
-    let (samples, model, value, report) = if let Content::Model(model) = &request.source.content {
-        (Arc::new(SampleSet::default()), (**model).clone(), f64::NAN, None)
-    } else {
-        let samples = sample(request, kept)?;
-        lap(0);
-        begin(Stage::Fitting)?;
-        let told = |evaluations: usize| {
-            if evaluations.is_multiple_of(8) {
-                tell(News::Stage { stage: Stage::Fitting, evaluations });
-            }
-        };
-        let (model, value, report) = fit(request, &samples, &cancelled, &told)?;
-        (samples, model, value, report)
-    };
-    lap(1);
-    begin(Stage::BakingMean)?;
-    let mean = Arc::new(bake_mean(&model));
-    lap(2);
-    let version = VERSION.fetch_add(1, Ordering::Relaxed);
-    let model = Arc::new(model);
-    tell(News::Fitted(Box::new(Fitted {
-        version,
-        model: Arc::clone(&model),
-        samples,
-        log_marginal_likelihood: value,
-        report,
-        mean: Arc::clone(&mean),
-        sigma: None,
-        cells: None,
-        images: None,
-        seconds,
-    })));
-    begin(Stage::BakingSigma)?;
-    let sigma = bake_sigma(&model);
-    if let Some(table) = sigma_as_table(&sigma) {
-        tell(News::Sigma { version, sigma: Arc::new(table) });
-    }
-    if matches!(request.source.content, Content::Model(_) | Content::Samples(_)) {
-        return Ok(());
-    }
-    let truth = if let Some(truth) = &request.truth {
-        Arc::clone(truth)
-    } else {
-        begin(Stage::Tabulating)?;
-        let Some(truth) = request.source.table() else { return Ok(()) };
-        let truth = Arc::new(truth.into_owned());
-        tell(News::Truth(Arc::clone(&truth)));
-        truth
-    };
-    begin(Stage::Comparing)?;
-    let noise = model.noise_variances();
-    let interval = |cell: usize| {
-        let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-            let latent = f64::from(sigma.value(cell, c));
-            let mean = f64::from(mean.values()[cell][c]);
-            interval_95(model.transform, mean, (latent * latent + noise[c]).sqrt())
-        });
-        (ends.map(|e| e.0), ends.map(|e| e.1))
-    };
-    let cells = Box::new(CellMetrics::new(&truth, &mean, Some(&interval))?);
-    tell(News::Cells { version, cells });
+    Run::new(follower).job(&job)?;
     Ok(())
 }
 
-/// The samples of a request, measured unless they are kept.
-fn sample(request: &Request, kept: &mut Kept) -> Result<Arc<SampleSet>, Stop> {
-    let key = request.spec.sample_key();
-    if let Some((known, samples)) = kept.get(&request.document)
-        && *known == key
-    {
-        return Ok(Arc::clone(samples));
-    }
-    let samples = request.spec.measure(&request.source).map_err(|error| Stop::Error(format!("{error:#}")))?;
-    let samples = Arc::new(samples);
-    kept.insert(request.document, (key, Arc::clone(&samples)));
-    Ok(samples)
+/// Reports the stages and results of one request.
+struct Follower {
+    document: DocumentId,
+    version: u64,
+    cancel: Arc<AtomicBool>,
+    kept: Kept,
+    outbox: Outbox<Report>,
 }
 
-/// The model of a request, its log marginal likelihood and how a search went.
-fn fit(
-    request: &Request,
-    samples: &SampleSet,
-    cancelled: &dyn Fn() -> bool,
-    told: &dyn Fn(usize),
-) -> Result<(Model, f64, Option<FitReport>), Stop> {
-    let (spec, source) = (&request.spec, &request.source);
-    let provenance = Provenance {
-        material: source.name.clone(),
-        source: source.origin(),
-        sha256: source.sha256.clone(),
-        ..Provenance::default()
-    };
-    let options = spec.options();
-    // Hyper-parameters of a lattice do not suit scattered samples, nor the other way round.
-    let given = spec.hyper.as_ref().filter(|h| matches!(h, Hyper::Lattice(_)) == samples.lattice.is_some());
-    if let Some(hyper) = given {
-        let (model, value) = condition(samples, &options, hyper, provenance)?;
-        return Ok((model, value, None));
+impl Follower {
+    fn new(request: &Request, cancel: Arc<AtomicBool>, kept: Kept, outbox: Outbox<Report>) -> Self {
+        let version = VERSION.fetch_add(1, Ordering::Relaxed);
+        Self { document: request.document, version, cancel, kept, outbox }
     }
-    let shapes = spec.shapes();
-    let count = std::cell::Cell::new(0);
-    let ask = || {
-        count.set(count.get() + 1);
-        told(count.get());
-        cancelled()
-    };
-    let (model, mut reports) =
-        fit_per_axis(samples, &options, shapes.each_ref().map(|s| s.as_slice()), provenance, &ask)?;
-    let report = reports.pop();
-    let value = report.as_ref().map_or(f64::NAN, |r| r.log_marginal_likelihood);
-    Ok((model, value, report))
+
+    fn tell(&self, news: News) {
+        self.outbox.send(Report { document: self.document, news });
+    }
+
+    /// The samples that an earlier request has left.
+    fn measured(&self) -> Option<Measured> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(&self.document).cloned()
+    }
 }
 
-/// Sigma of each channel as a table, to be looked up like one.
-fn sigma_as_table(sigma: &SigmaTable) -> Option<BrdfTable> {
-    let values = match sigma.planes() {
-        [plane] => plane.iter().map(|&s| [s; 3]).collect(),
-        _ => (0..N_CELLS).map(|cell| std::array::from_fn(|c| sigma.value(cell, c))).collect(),
-    };
-    BrdfTable::from_values(values)
+impl Observer for Follower {
+    fn begin(&self, stage: Stage) {
+        self.tell(News::Stage { stage, evaluations: 0 });
+    }
+
+    fn progress(&self, progress: Progress) {
+        if let Progress::Evaluations(evaluations) = progress
+            && evaluations.is_multiple_of(8)
+        {
+            self.tell(News::Stage { stage: Stage::Fit, evaluations });
+        }
+    }
+
+    fn found(&self, found: Found<'_>) {
+        let version = self.version;
+        match found {
+            Found::Samples(measured) => {
+                let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+                kept.insert(self.document, measured.clone());
+            }
+            Found::Mean { fitted, mean, seconds } => {
+                let samples = fitted.measured.as_ref().map(|measured| Arc::clone(&measured.samples));
+                self.tell(News::Fitted(Box::new(Fitted {
+                    version,
+                    model: Arc::clone(&fitted.model),
+                    samples: samples.unwrap_or_default(),
+                    log_marginal_likelihood: fitted.log_marginal_likelihood,
+                    report: fitted.reports.first().cloned(),
+                    mean: Arc::clone(mean),
+                    sigma: None,
+                    cells: None,
+                    images: None,
+                    seconds: [Stage::Sample, Stage::Fit, Stage::BakeMean].map(|stage| seconds.of(stage)),
+                })));
+            }
+            Found::Sigma(sigma) => self.tell(News::Sigma { version, sigma: Arc::new(sigma.to_table()) }),
+            Found::Truth(truth) => self.tell(News::Truth(Arc::clone(truth))),
+            Found::Cells(cells) => self.tell(News::Cells { version, cells: Box::new(cells.clone()) }),
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
 }

@@ -283,7 +283,8 @@ impl Scene {
             (Some(table), _) => Some((key.document, BrdfTexture::upload(context, table, None, precision)?)),
         };
         let sigma = request.sigma.as_ref();
-        let sigma = sigma.and_then(|table| SigmaTable::from_planes(vec![largest_channel(table)]));
+        let sigma = sigma.map(|table| SigmaTable::from_planes(vec![largest_channel(table)]));
+        let sigma = sigma.transpose().map_err(gpbrdf_render::Error::from)?;
         let prediction = BrdfTexture::upload(context, &request.mean, sigma.as_ref(), precision)?;
         renderer.set_materials(truth.as_ref().map(|t| &t.1), &prediction)?;
         self.materials = Some(Materials { truth, prediction: (key.version, key.has_sigma, prediction) });

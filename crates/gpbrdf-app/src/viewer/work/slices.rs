@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage};
+use gpbrdf_core::figure::round_limit;
 use gpbrdf_core::figure::{Colormap, Slice};
+use gpbrdf_core::sample::log_value;
 use gpbrdf_core::{Brdf, BrdfTable, Rgb, Source};
 
 use crate::viewer::state::document::{Document, DocumentId};
@@ -60,7 +62,7 @@ impl Truth {
     pub(crate) fn brdf(&self) -> Option<&dyn Brdf> {
         match self {
             Self::Table(table) => Some(table.as_ref()),
-            Self::Source(source) => source.brdf(),
+            Self::Source(source) => source.brdf().ok(),
         }
     }
 }
@@ -128,9 +130,8 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
     let plain =
         |slice: &Slice| SliceImage { image: image(slice, |i| look.colour(slice.values()[i])), limit: None };
     let difference = truth.as_ref().map(|truth| {
-        let log = |x: f64| (x.max(0.0) + 1e-3).ln();
         let gap: Vec<f64> = std::iter::zip(mean.values(), truth.values())
-            .map(|(a, b)| look.channel.of(std::array::from_fn(|c| log(a[c]) - log(b[c]))))
+            .map(|(a, b)| look.channel.of(std::array::from_fn(|c| log_value(a[c]) - log_value(b[c]))))
             .collect();
         let limit = round_limit(&gap, mean.above_horizon());
         let image = image(truth, |i| colour(Colormap::Diverging, 0.5 + 0.5 * gap[i] / limit));
@@ -160,31 +161,9 @@ fn image(slice: &Slice, colour: impl Fn(usize) -> Color32) -> ColorImage {
     ColorImage::new([slice.size(); 2], pixels)
 }
 
-/// 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in `mask`; at least
-/// 1e-6.
-pub(crate) fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
-    let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());
-    let mut sizes: Vec<f64> = finite.map(|(x, _)| x.abs()).collect();
-    let at = sizes.len() * 99 / 100;
-    let level = if at < sizes.len() { *sizes.select_nth_unstable_by(at, f64::total_cmp).1 } else { 0.0 };
-    let level = level.max(1e-6);
-    let power = 10.0f64.powf(level.log10().floor());
-    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= level * (1.0 - 1e-9)).unwrap_or(10.0);
-    step * power
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn limits_are_round_and_cover_the_values() {
-        let limit = |values: &[f64]| round_limit(values, &vec![true; values.len()]);
-        for (x, expected) in [(0.013, 0.02), (0.02, 0.02), (0.4, 0.5), (7.0, 10.0), (0.0, 1e-6)] {
-            assert!((limit(&[x]) / expected - 1.0).abs() < 1e-9, "{x}");
-        }
-        assert!(limit(&[]) > 0.0 && limit(&[f64::NAN, 0.4]) > 0.0);
-    }
 
     #[test]
     fn channels_and_chroma_change_the_colour() {

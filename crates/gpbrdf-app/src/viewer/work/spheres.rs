@@ -7,6 +7,7 @@ use std::time::Duration;
 use eframe::egui::{Color32, ColorImage};
 use gpbrdf_core::brdf::direction;
 use gpbrdf_core::figure::Colormap;
+use gpbrdf_core::figure::round_limit;
 use gpbrdf_core::judge::{
     DistantLight, ENV_PATCHES, Image, ImageMetrics, POINT_LIGHT, SPHERE_SIZE, environment_lights,
     exposure_of, psnr, render_sphere, ssim,
@@ -15,7 +16,7 @@ use gpbrdf_core::{BrdfTable, Environment};
 
 use super::mailbox::{Mailbox, Sender};
 use super::outbox::Outbox;
-use super::slices::{colour, round_limit, shown};
+use super::slices::{colour, shown};
 use crate::viewer::state::document::DocumentId;
 use crate::viewer::state::look::SphereLight;
 

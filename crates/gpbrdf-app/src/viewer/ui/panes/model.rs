@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
-use gpbrdf_core::{Hyper, LatticeLayout, MeanFunction, Process, Symmetry};
+use gpbrdf_core::{LatticeLayout, MeanFunction, Shape, Symmetry};
 
-use crate::viewer::spec::{
-    KernelKind, LayoutKind, ModelSpec, SymmetryKind, TransformKind, hyper_parameters, set_hyper_parameter,
+use crate::job::{
+    Kernels, LayoutChoice, ModelSpec, NoiseChoice, SymmetryChoice, TransformChoice, hyper_sliders,
 };
 use crate::viewer::state::document::{Document, Work};
 use crate::viewer::ui::pane::{Command, Offers, Order, Pane, PaneContext, Place, Start};
@@ -115,13 +115,7 @@ fn measurements_ui(ui: &mut Ui, document: &mut Document) {
     if document.is_model() {
         ui.label("A fitted model from a file.");
         if let Some(fitted) = &document.fitted {
-            let kind = match fitted.model.process {
-                Process::Lattice(_) => "Exact, on a lattice",
-                Process::Dense(_) => "Exact, dense",
-                Process::Inducing(_) => "Compressed, on inducing lattices",
-                _ => "Of another kind",
-            };
-            ui.label(format!("{kind}: {} numbers.", fitted.model.floats()));
+            ui.label(format!("{}: {} numbers.", fitted.model.solver_label(), fitted.model.n_floats()));
         }
     } else if document.is_scattered() {
         ui.label("Scattered measurements: all are used, solved densely.");
@@ -133,22 +127,23 @@ fn measurements_ui(ui: &mut Ui, document: &mut Document) {
 fn layout_ui(ui: &mut Ui, spec: &mut ModelSpec) {
     let help = "Where to measure: a lattice in the warped box, or scattered directions, solved densely";
     let before = spec.layout;
-    choice_ui(ui, "Layout", &mut spec.layout, &LayoutKind::ALL, LayoutKind::name);
-    if (before == LayoutKind::Lattice) != (spec.layout == LayoutKind::Lattice) {
+    choice_ui(ui, "Layout", &mut spec.layout, &LayoutChoice::ALL, LayoutChoice::label);
+    if (before == LayoutChoice::Lattice) != (spec.layout == LayoutChoice::Lattice) {
         spec.hyper = None;
     }
-    if spec.layout == LayoutKind::Lattice {
-        let mut count = spec.samples() as f64;
+    if spec.layout == LayoutChoice::Lattice {
+        let mut count = spec.count() as f64;
         let mut number = Number::new("Samples", 64.0..=MAX_LATTICE, 36_864.0, help);
         (number.logarithmic, number.whole) = (true, true);
         if number.row_ui(ui, &mut count)
             && let Ok(lattice) = LatticeLayout::with_samples(whole(count), Symmetry::Bilateral)
         {
-            spec.shape = lattice.shape;
+            spec.lattice = Some(lattice.shape);
         }
         row_ui(ui, "Lattice", |ui| {
             let defaults = LatticeLayout::default().shape;
-            for ((side, default), name) in spec.shape.iter_mut().zip(defaults).zip(["θh", "θd", "φd"]) {
+            let mut shape = spec.shape();
+            for ((side, default), name) in shape.iter_mut().zip(defaults).zip(["θh", "θd", "φd"]) {
                 let value = egui::DragValue::new(side).range(2..=160).speed(0.1);
                 let help = format!("Nodes along {name}\nCtrl+click: back to {default}");
                 let response =
@@ -157,14 +152,15 @@ fn layout_ui(ui: &mut Ui, spec: &mut ModelSpec) {
                     *side = default;
                 }
             }
+            spec.lattice = Some(shape);
         });
-        choice_ui(ui, "Symmetry", &mut spec.symmetry, &SymmetryKind::ALL, SymmetryKind::name);
+        choice_ui(ui, "Symmetry", &mut spec.symmetry, &SymmetryChoice::ALL, SymmetryChoice::label);
     } else {
-        let mut count = spec.count as f64;
+        let mut count = spec.count() as f64;
         let mut number = Number::new("Samples", 20.0..=MAX_DENSE, 800.0, help);
         (number.logarithmic, number.whole) = (true, true);
         if number.row_ui(ui, &mut count) {
-            spec.count = whole(count);
+            spec.samples = Some(whole(count));
         }
         let seed = row_ui(ui, "Seed", |ui| ui.add(egui::DragValue::new(&mut spec.seed)));
         if reset(ui, &seed.on_hover_text("Of the random directions\nCtrl+click: back to 0")) {
@@ -182,15 +178,22 @@ fn process_ui(ui: &mut Ui, document: &mut Document) {
     let scattered = document.is_scattered();
     let spec = &mut document.spec;
     let names = ["Kernel θh", "Kernel θd", "Kernel φd"];
-    if spec.layout == LayoutKind::Lattice && !scattered {
-        for (kernel, name) in spec.kernels.iter_mut().zip(names) {
-            choice_ui(ui, name, kernel, &KernelKind::ALL, KernelKind::name);
+    let choose = |ui: &mut Ui, kernel: &Kernels, name: &str, axis: usize| {
+        // A kernel that a session brought and no list offers stays until another is chosen.
+        let mut shape = kernel.choice(axis).unwrap_or(Kernels::CHOICES[0]);
+        choice_ui(ui, name, &mut shape, &Kernels::CHOICES, Shape::label).then_some(shape)
+    };
+    if spec.layout == LayoutChoice::Lattice && !scattered {
+        for (axis, name) in names.into_iter().enumerate() {
+            if let Some(shape) = choose(ui, &spec.kernel, name, axis) {
+                spec.kernel.set(axis, shape);
+            }
         }
-    } else if choice_ui(ui, "Kernel", &mut spec.kernels[0], &KernelKind::ALL, KernelKind::name) {
-        spec.kernels = [spec.kernels[0]; 3];
+    } else if let Some(shape) = choose(ui, &spec.kernel, "Kernel", 0) {
+        spec.kernel.set_all(shape);
     }
-    choice_ui(ui, "Target", &mut spec.transform, &TransformKind::ALL, TransformKind::name);
-    if spec.transform == TransformKind::Log {
+    choice_ui(ui, "Target", &mut spec.transform, &TransformChoice::ALL, TransformChoice::label);
+    if spec.transform == TransformChoice::Log {
         let mut number =
             Number::new("ε (1/sr)", 1e-6..=1.0, 1e-3, "Keeps dark values apart from zero in ln(f + ε)");
         number.logarithmic = true;
@@ -199,14 +202,14 @@ fn process_ui(ui: &mut Ui, document: &mut Document) {
     let means = [MeanFunction::Constant, MeanFunction::Zero];
     let mean_name = |m| if m == MeanFunction::Zero { "Zero" } else { "Average of the samples" };
     choice_ui(ui, "Prior mean", &mut spec.mean, &means, mean_name);
-    let mut fixed = spec.noise.is_some();
+    let mut fixed = spec.noise.0.is_some();
     row_ui(ui, "Noise", |ui| {
         ui.checkbox(&mut fixed, "Fixed").on_hover_text("Hold the noise variance while optimising");
     });
-    if fixed != spec.noise.is_some() {
-        spec.noise = fixed.then_some(1e-6);
+    if fixed != spec.noise.0.is_some() {
+        spec.noise = NoiseChoice(fixed.then_some(1e-6));
     }
-    if let Some(noise) = &mut spec.noise {
+    if let Some(noise) = &mut spec.noise.0 {
         let mut number =
             Number::new("Fixed noise", 1e-12..=1.0, 1e-6, "Noise variance in squared target units");
         number.logarithmic = true;
@@ -215,13 +218,13 @@ fn process_ui(ui: &mut Ui, document: &mut Document) {
 }
 
 fn hyper_ui(ui: &mut Ui, document: &mut Document) {
-    let current = document.fitted.as_ref().and_then(|f| Hyper::of(&f.model));
+    let current = document.fitted.as_ref().and_then(|fitted| fitted.model.hyper());
     let Some(hyper) = document.spec.hyper.clone().or(current) else {
         ui.weak("Found by the first fit");
         return;
     };
-    let defaults = document.optimum.as_ref().map(hyper_parameters).unwrap_or_default();
-    for (index, parameter) in hyper_parameters(&hyper).into_iter().enumerate() {
+    let defaults = document.optimum.as_ref().map(hyper_sliders).unwrap_or_default();
+    for (index, parameter) in hyper_sliders(&hyper).into_iter().enumerate() {
         let default = defaults.get(index).map_or(parameter.value, |d| d.value);
         let (low, high) = parameter.range;
         let help = "Set by hand; the search found the default";
@@ -230,7 +233,7 @@ fn hyper_ui(ui: &mut Ui, document: &mut Document) {
         let mut value = parameter.value;
         if number.row_ui(ui, &mut value) {
             let mut changed = hyper.clone();
-            if set_hyper_parameter(&mut changed, index, value).is_ok() {
+            if changed.set(index, value).is_ok() {
                 document.spec.hyper = Some(changed);
             }
         }
@@ -261,9 +264,9 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
                 ui.spinner();
                 let seconds = since.elapsed().as_secs_f64();
                 let text = if *evaluations > 0 {
-                    format!("{} ({evaluations})", stage.name())
+                    format!("{} ({evaluations})", stage.label())
                 } else {
-                    stage.name().to_owned()
+                    stage.label().to_owned()
                 };
                 ui.label(if seconds > 1.0 { format!("{text}, {seconds:.0} s") } else { text });
             }
@@ -301,11 +304,7 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
     line(
         ui,
         "Log likelihood",
-        if fitted.log_marginal_likelihood.is_nan() {
-            "–".into()
-        } else {
-            format!("{:.1}", fitted.log_marginal_likelihood)
-        },
+        fitted.log_marginal_likelihood.map_or("–".into(), |value| format!("{value:.1}")),
         "Log marginal likelihood of the samples, all channels together",
     );
     if let Some(report) = &fitted.report {

@@ -452,7 +452,7 @@ fn degrees_marks(input: &GridInput, warp: bool) -> Vec<GridMark> {
 fn sample_points(document: &Document, phi_d: f64, place: impl Fn(f64) -> f64) -> Vec<[f64; 2]> {
     let Some(fitted) = &document.fitted else { return Vec::new() };
     // Near means within half a step of `phi_d` of a lattice.
-    let width = match &fitted.samples.lattice {
+    let width = match fitted.samples.lattice() {
         Some(lattice) => 0.51 * FRAC_PI_2 / lattice.shape[2] as f64,
         None => 5f64.to_radians(),
     };
@@ -478,8 +478,7 @@ fn hover_lines(document: &Document, angles: HalfDiff) -> Vec<(&'static str, Stri
         let mean = fitted.mean.eval_half_diff(angles);
         lines.push(("mean", rgb(mean)));
         if let Some(sigma) = &fitted.sigma {
-            let noise = fitted.model.noise_variances();
-            let (low, high) = band_at(fitted.model.transform, mean, sigma, noise, angles);
+            let (low, high) = band_at(&fitted.model, mean, sigma, angles);
             lines.push(("95 % from", rgb(low)));
             lines.push(("95 % to", rgb(high)));
         }

@@ -11,6 +11,7 @@ use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Color32, Context, Rect, RichText, Sense, TextureHandle, Ui, pos2, vec2};
 use gpbrdf_core::Environment;
+use gpbrdf_core::formats::read_environment;
 
 use self::object::ObjectView;
 use self::sphere::SphereView;
@@ -211,7 +212,7 @@ impl ThreeD {
         let outbox = self.outbox.map(Message::Map);
         let cannot = format!("cannot read \"{}\"", path.display());
         in_background(&outbox, "reader", &cannot, move || {
-            let environment = Environment::read(&path).map_err(|error| error.to_string())?;
+            let environment = read_environment(&path).map_err(|error| error.to_string())?;
             Ok((path, Arc::new(environment)))
         });
     }
