@@ -1,5 +1,6 @@
 //! A graphics device for tests.
 
+use std::io::Write as _;
 use std::sync::OnceLock;
 
 use gpbrdf_render::{AdapterChoice, Context};
@@ -16,7 +17,8 @@ pub(crate) fn on_device(name: &str, test: fn(&Context)) {
         Err(error) => {
             let required = std::env::var("GPBRDF_REQUIRE_GPU").is_ok_and(|value| value == "1");
             assert!(!required, "{error}");
-            eprintln!("skipped {name}: {error}");
+            // Not by `eprintln!`, which is captured.
+            let _ = std::io::stderr().write_all(format!("skipped {name}: {error}\n").as_bytes());
         }
     }
 }
