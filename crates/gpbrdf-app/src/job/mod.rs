@@ -4,6 +4,15 @@
 //! session of the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results.
 //! [`Report`] is what the command line says about a run, to machines and to people.
 
+#![cfg_attr(
+    not(feature = "viewer"),
+    allow(
+        dead_code,
+        unused_imports,
+        reason = "results as they come and samples that are kept serve the viewer"
+    )
+)]
+
 mod backend;
 mod choices;
 mod compression;
