@@ -1,6 +1,6 @@
-//! Gaussian-process BRDFs: a complete, render-ready material out of few measurements, with an error bar.
+//! Gaussian-process BRDFs: a complete, render-ready material from few measurements, with an error bar.
 //!
-//! From a file, or a built-in material, to a table of mean and sigma:
+//! From a file or a built-in material to a table of mean and sigma:
 //!
 //! ```
 //! use gpbrdf_core::{Baked, FitOptions, LatticeLayout, Layout, Source, Symmetry, fit};
@@ -16,24 +16,27 @@
 //! # }
 //! ```
 //!
-//! The names that most users need are here; everything else is in the modules, which follow the data:
+//! The names that most users need are exported here. The modules hold everything else; they follow the flow
+//! of data:
 //!
-//! - [`formats`]: [`Source`] opens every kind of file that is read and the built-in [materials](brdf::materials).
-//! - [`brdf`]: the trait [`Brdf`], half-difference angles, tables, analytic models. Local frame with the normal `+z`, `wi`
-//!   to the light, `wo` to the viewer, both unit; `f` in sr^-1 without the cosine; angles in radians. f64 throughout,
-//!   f32 in tables.
+//! - [`formats`]: [`Source`] opens every kind of file that can be read, and the built-in
+//!   [materials](brdf::materials).
+//! - [`brdf`]: the trait [`Brdf`], half-difference angles, tables and analytic models. In the local frame the
+//!   normal is `+z`; `wi` points to the light and `wo` to the viewer, both of unit length. Values are `f` in
+//!   sr^-1 without the cosine, angles are in radians, numbers are f64 (f32 in tables).
 //! - [`sample`]: [`Layout`] says where to measure, [`SampleSet`] holds what was measured.
-//! - [`kernel`], [`gp`]: covariance functions, and exact Gaussian processes: on a product lattice in milliseconds, on any
-//!   points in `O(n^3)`.
-//! - [`model`]: [`fit`] finds hyper-parameters by maximum marginal likelihood; a [`Model`] predicts means and intervals,
-//!   is itself a [`Brdf`], and is saved and loaded bit for bit; [`Baked`] fills all 1,458,000 cells.
+//! - [`kernel`], [`gp`]: covariance functions and exact Gaussian processes. On a product lattice they take
+//!   milliseconds, on scattered points `O(n^3)` operations.
+//! - [`model`]: [`fit`] finds hyper-parameters by maximum marginal likelihood. A [`Model`] predicts means and
+//!   intervals, implements [`Brdf`], and is saved and loaded bit for bit. [`Baked`] holds its values in all
+//!   1,458,000 cells of a table.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
-//! The features `formats` and `figures` are on by default; without them a program that loads and evaluates models builds
-//! without readers of files, pictures and fonts.
+//! The features `formats` and `figures` are on by default. Without them the crate still loads and evaluates
+//! models, and is built without the dependencies that read files and draw pictures and fonts.
 //!
-//! Results do not depend on the number of threads. The paper is Hao, Liu and Weng, "A BRDF Representing Method Based on
-//! Gaussian Process"; equation numbers without another source are its.
+//! Results do not depend on the number of threads. "The paper" is Hao, Liu and Weng, "A BRDF Representing
+//! Method Based on Gaussian Process"; equation numbers without another source refer to it.
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::float_cmp, reason = "tests state exact expectations"))]
 
 pub mod base;

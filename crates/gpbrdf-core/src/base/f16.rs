@@ -1,13 +1,13 @@
-//! Half precision as a format of storage.
+//! Half precision as a storage format.
 
 use ::half::f16;
 
-/// The nearest number of half precision; beyond 65,504 the largest.
+/// The nearest number of half precision; beyond 65,504 in size, the largest finite one.
 pub(crate) fn round_to_half(x: f64) -> f64 {
     to_half(x).to_f64()
 }
 
-/// The nearest half, beyond the range the largest.
+/// Like [`round_to_half`], as a half.
 pub(crate) fn to_half(x: f64) -> f16 {
     f16::from_f64(x.clamp(f16::MIN.to_f64(), f16::MAX.to_f64()))
 }

@@ -1,4 +1,5 @@
-//! What has no subject of its own: errors, files written whole, random numbers, vector instructions, half precision.
+//! Utilities without a subject of their own: errors, files written whole, random numbers, vector
+//! instructions, half precision, numbers for people.
 
 pub(crate) mod atomic_file;
 pub(crate) mod error;

@@ -1,4 +1,5 @@
-//! Kernels between one point and a run of points, a strip at a time so that everything stays in the first cache.
+//! Kernels between one point and a run of points, one strip at a time, so that all work arrays stay in the
+//! first cache.
 
 use std::ops::Range;
 
@@ -6,10 +7,10 @@ use super::axis::Kernel1d;
 use super::composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
 use crate::base::simd::{add_scaled, dot, dot3, multiply, scale_into, vectorized};
 
-/// Points of a strip.
+/// Number of points of a strip.
 const STRIP: usize = 512;
 
-/// Points of dimension `d`, one array a coordinate; an angle is kept as its sine and cosine.
+/// Points of dimension `d`, stored as one array per coordinate. An angle is stored as its sine and cosine.
 #[derive(Clone, Debug)]
 pub(crate) struct Points {
     len: usize,
@@ -23,7 +24,7 @@ enum AxisPoints {
 }
 
 impl Points {
-    /// From row-major `x`, `n` rows of `metric.len()` coordinates.
+    /// Points from row-major `x`: `n` rows of `metric.len()` coordinates.
     pub(crate) fn new(x: &[f64], metric: &[AxisMetric]) -> Self {
         let dimension = metric.len().max(1);
         let column = |k: usize| x.iter().skip(k).step_by(dimension);
@@ -45,7 +46,7 @@ impl Points {
         self.len
     }
 
-    /// Squared distances along axis `k` from the points of `range` to point `j` of `other`.
+    /// Squared distances along axis `k` between the points of `range` and point `j` of `other`.
     fn squared_distances(&self, k: usize, range: Range<usize>, other: &Self, j: usize, out: &mut [f64]) {
         match (&self.axes[k], &other.axes[k]) {
             (AxisPoints::Linear(x), AxisPoints::Linear(y)) => {
@@ -71,12 +72,12 @@ impl Points {
     }
 }
 
-/// Working arrays of one thread.
+/// Work arrays of one thread.
 #[derive(Debug)]
 pub(crate) struct RowScratch {
     /// Squared distances along each axis.
     d2: Vec<[f64; STRIP]>,
-    /// Values of each axis' factor of a product.
+    /// Values of each axis's factor of a product.
     factors: Vec<[f64; STRIP]>,
     r2: [f64; STRIP],
     value: [f64; STRIP],
@@ -136,8 +137,8 @@ impl Kernel {
         }
     }
 
-    /// Adds `sum_i weights[i] dk(points[rows.start + i], points[j])/dp` to `gradient[p]` for every log-parameter
-    /// `p`.
+    /// Adds `sum_i weights[i] dk(points[rows.start + i], points[j])/dp` to `gradient[p]` for every
+    /// log-parameter `p`.
     pub(crate) fn add_row_gradient(
         &self,
         points: &Points,
@@ -162,7 +163,7 @@ impl Kernel {
 }
 
 impl RowScratch {
-    /// `r2 = sum_k d_k^2 / l_k^2`.
+    /// Computes `r2 = sum_k d_k^2 / l_k^2`.
     fn joint_distances(&mut self, length_scale: &[f64], n: usize) {
         for (k, (d2, l)) in self.d2.iter().zip(length_scale).enumerate() {
             if k == 0 {
@@ -173,7 +174,7 @@ impl RowScratch {
         }
     }
 
-    /// The kernel of every axis.
+    /// Computes the kernel of every axis.
     fn fill_factors(&mut self, axes: &[Kernel1d], n: usize) {
         for ((axis, d2), factor) in axes.iter().zip(&self.d2).zip(&mut self.factors) {
             factor[..n].fill(0.0);
@@ -185,7 +186,7 @@ impl RowScratch {
         }
     }
 
-    /// Adds the derivatives by the log-parameters of one term; returns their number.
+    /// Adds the derivatives with respect to the log-parameters of one term. Returns their number.
     fn add_term_gradient(&mut self, term: &KernelTerm, weights: &[f64], gradient: &mut [f64]) -> usize {
         let n = weights.len();
         let variance = term.variance;

@@ -1,9 +1,10 @@
-//! Shapes over whole slices, in vector instructions where the form is closed.
+//! Shapes evaluated over whole slices, in vector instructions where there is a closed form.
 
 use super::shape::Shape;
 use crate::base::simd::{exp, exp_slice, vectorized};
 
-/// Above this `exp(-s)` is zero; bounding the factor of it by this keeps infinity times zero out.
+/// Above this `exp(-s)` is zero. Factors of it are bounded by this, so that infinity is not multiplied by
+/// zero.
 const LARGEST: f64 = 800.0;
 
 #[inline(always)]
@@ -31,7 +32,7 @@ fn map_pair(r2: &[f64], value: &mut [f64], slope: &mut [f64], f: impl Fn(f64) ->
 }
 
 impl Shape {
-    /// Replaces every squared scaled distance by [`Shape::value`] of it, to 1e-15.
+    /// Replaces every squared scaled distance by its [`Shape::value`], with an error of 1e-15.
     pub(crate) fn fill(self, r2: &mut [f64]) {
         match self {
             Self::SquaredExponential => map(r2, |r2| exp(-0.5 * r2)),
@@ -58,7 +59,7 @@ impl Shape {
         }
     }
 
-    /// [`Shape::value_and_slope`] of every squared scaled distance; three slices of one length.
+    /// [`Shape::value_and_slope`] of every squared scaled distance. The three slices have the same length.
     pub(crate) fn fill_with_slope(self, r2: &[f64], value: &mut [f64], slope: &mut [f64]) {
         match self {
             Self::SquaredExponential => map_pair(r2, value, slope, |r2| {

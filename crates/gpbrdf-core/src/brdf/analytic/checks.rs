@@ -1,4 +1,4 @@
-//! Properties that every model must have, for the tests of this folder and of the built-in materials.
+//! Properties that every model must have. The tests of this folder and of the built-in materials use them.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -25,7 +25,7 @@ pub(crate) fn pinned_pairs() -> [Pair; 4] {
     })
 }
 
-/// Compares with values computed elsewhere, one triple for each of [`pinned_pairs`].
+/// Asserts values that were computed elsewhere, one triple for each of [`pinned_pairs`].
 pub(crate) fn assert_pinned(brdf: &impl Brdf, expected: [Rgb; 4]) {
     for ((wi, wo), expected) in pinned_pairs().iter().zip(expected) {
         let found = brdf.eval(wi, wo);
@@ -55,7 +55,8 @@ pub(crate) fn random_pairs(seed: u64, count: usize) -> Vec<Pair> {
     (0..count).map(|_| (one(), one())).filter(|(a, b)| a.z > 1e-3 && b.z > 1e-3).collect()
 }
 
-/// Random pairs and the extreme ones: `h = n`, retro-reflection, grazing, all down to the smallest cosine.
+/// Random pairs and extreme ones: `h = n`, retro-reflection and grazing angles, down to the smallest positive
+/// cosine.
 pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
     let mut pairs = random_pairs(seed, 2000);
     let cosines =
@@ -69,7 +70,7 @@ pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
             for gap in [0.0, 1e-9, 1.0, FRAC_PI_2, PI - 1e-9, PI] {
                 pairs.push((at(a, 0.3), at(b, 0.3 + gap)));
             }
-            // Exactly opposite azimuths, without the rounding of sin(pi).
+            // Exactly opposite azimuths, without the rounding error of sin(pi).
             let (u, v) = (at(a, 0.3), at(b, 0.3));
             pairs.push((u, Vector3::new(-v.x, -v.y, v.z)));
         }
@@ -77,7 +78,7 @@ pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
     pairs
 }
 
-/// Finite, non-negative, reciprocal, and zero at and below the horizon.
+/// Asserts that the values are finite, non-negative and reciprocal, and zero at and below the horizon.
 pub(crate) fn assert_finite_and_reciprocal(brdf: &impl Brdf, what: &str) {
     for (wi, wo) in all_pairs(1) {
         let f = brdf.eval(&wi, &wo);
@@ -91,7 +92,8 @@ pub(crate) fn assert_finite_and_reciprocal(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// A function of half-difference angles alone: unchanged when both directions turn about the normal.
+/// Asserts that the value depends on half-difference angles alone: it is unchanged when both directions turn
+/// about the normal.
 pub(crate) fn assert_isotropic(brdf: &impl Brdf, what: &str) {
     for (k, (wi, wo)) in random_pairs(2, 2000).into_iter().enumerate() {
         let f = brdf.eval(&wi, &wo);
@@ -106,7 +108,7 @@ pub(crate) fn assert_isotropic(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// All of the above.
+/// Asserts all of the above.
 pub(crate) fn assert_well_behaved(brdf: &impl Brdf, what: &str) {
     assert_finite_and_reciprocal(brdf, what);
     assert_isotropic(brdf, what);
@@ -131,7 +133,7 @@ pub(crate) fn albedo(brdf: &impl Brdf, theta_i: f64, n: u32) -> Rgb {
     sum
 }
 
-/// Albedo at most 1 at every tenth degree.
+/// Asserts an albedo of at most 1 at every tenth degree, and near the horizon.
 pub(crate) fn assert_conserves_energy(brdf: &impl Brdf, what: &str) {
     for degrees in (0..=80).step_by(10).chain([85, 88]) {
         let found = albedo(brdf, f64::from(degrees).to_radians(), 256);
@@ -139,7 +141,7 @@ pub(crate) fn assert_conserves_energy(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// `integral of D(theta) cos(theta) dw` over the hemisphere, `D` asked at unit half vectors.
+/// `integral of D(theta) cos(theta) dw` over the hemisphere, with `D` evaluated at unit half vectors.
 pub(crate) fn projected_area(distribution: impl Fn(&Vector3<f64>) -> f64) -> f64 {
     let n = 20_000;
     let step = FRAC_PI_2 / f64::from(n);
