@@ -12,7 +12,7 @@ use crate::brdf::Rgb;
 /// An sRGB colour, 8 bits per channel.
 pub type Rgb8 = [u8; 3];
 
-/// A lower-case theta of full height: that of the font is as low as an `e`, and looks like one.
+/// A lower-case theta of full height. The font's own theta is as low as an `e`, and looks like one.
 const THETA: [u8; 8] = [0x1c, 0x36, 0x36, 0x3e, 0x36, 0x36, 0x1c, 0x00];
 
 /// An 8-bit sRGB picture, rows from top to bottom. Drawing outside of it has no effect.

@@ -319,9 +319,8 @@ impl RglBrdf {
 }
 
 impl Brdf for RglBrdf {
-    /// `f(wi, wo)`. As measured, it obeys reciprocity only up to noise; wrap it in
-    /// [`Reciprocal`](crate::brdf::Reciprocal) where that matters. It is finite for all directions; a
-    /// `cos(theta_o)` below 1e-6 is replaced by 1e-6.
+    /// `f(wi, wo)`. As measured, it obeys reciprocity only up to noise; wrap it in [`Reciprocal`] where that
+    /// matters. It is finite for all directions; a `cos(theta_o)` below 1e-6 is replaced by 1e-6.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
         // This condition is also true for NaN, for which the result is zero.
         if !(wi.z > 0.0 && wo.z > 0.0) {
