@@ -1,7 +1,7 @@
 //! From samples to a model.
 
 use crate::base::error::{Error, Result};
-use crate::gp::solver::{Problem, Watch};
+use crate::gp::problem::{Problem, Watch};
 use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Solver};
 use crate::kernel::Shape;
 use crate::model::Model;

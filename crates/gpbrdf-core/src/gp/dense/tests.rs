@@ -194,7 +194,7 @@ fn blocks_of_the_inverse_match_the_identity() {
     let mut inverse = vec![vec![0.0; n]; n];
     for (first, width) in [(0, block), (block, block), (2 * block, 44)] {
         let mut columns = vec![0.0; (n - first) * width];
-        factor::inverse_columns(gp.factor().unwrap(), n, first, width, &mut columns);
+        inverse::inverse_columns(gp.factor().unwrap(), n, first, width, &mut columns);
         for (column, j) in columns.chunks(n - first).zip(first..) {
             for i in j..n {
                 inverse[i][j] = column[i - first];
