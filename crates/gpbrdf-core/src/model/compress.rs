@@ -154,7 +154,7 @@ fn components(grid: &CellGrid, offsets: [f64; 3], mix: [[f64; 3]; 3]) -> GridDat
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "formats"))]
 mod tests {
     use super::*;
     use crate::brdf::table::{N_CELLS, cell_center, cell_indices};

@@ -151,7 +151,7 @@ fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, 
     Ok((targets, offsets))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "formats"))]
 mod tests {
     use super::*;
     use crate::formats::source::Source;

@@ -230,3 +230,6 @@ impl Brdf for Model {
         out.copy_from_slice(&self.predict_mean(angles));
     }
 }
+
+#[cfg(test)]
+mod tests;

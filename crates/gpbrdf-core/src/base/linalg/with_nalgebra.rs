@@ -1,41 +1,45 @@
 //! By nalgebra, in the calling thread.
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DMatrixViewMut, Dyn, SymmetricEigen};
+use nalgebra::{Cholesky, Const, DMatrix, DMatrixView, DMatrixViewMut, Dyn, SymmetricEigen};
 
 /// A matrix.
 pub(crate) type Matrix = DMatrix<f64>;
 
-/// A matrix, or the transpose of one, that is a factor of a product: entry `(i, j)` stands at `i strides[0] + j strides[1]`.
+/// A matrix, or the transpose of one, that is a factor of a product.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View<'a> {
-    values: &'a [f64],
-    shape: [usize; 2],
-    strides: [usize; 2],
+    stored: &'a [f64],
+    rows: usize,
+    columns: usize,
+    stride: usize,
+    transposed: bool,
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
     pub(crate) fn nrows(self) -> usize {
-        self.shape[0]
+        if self.transposed { self.columns } else { self.rows }
     }
 
     pub(crate) fn ncols(self) -> usize {
-        self.shape[1]
+        self.transpose().nrows()
     }
 
     pub(crate) fn transpose(self) -> Self {
-        let ([rows, columns], [down, right]) = (self.shape, self.strides);
-        Self { shape: [columns, rows], strides: [right, down], ..self }
+        Self { transposed: !self.transposed, ..self }
     }
 
     pub(crate) fn subrows(self, first: usize, rows: usize) -> Self {
-        let values = &self.values[first * self.strides[0]..];
-        Self { values, shape: [rows, self.shape[1]], ..self }
+        if self.transposed {
+            Self { stored: &self.stored[first * self.stride..], columns: rows, ..self }
+        } else {
+            Self { stored: &self.stored[first..], rows, ..self }
+        }
     }
-}
 
-impl<'a> From<View<'a>> for DMatrixView<'a, f64, Dyn, Dyn> {
-    fn from(View { values, shape, strides }: View<'a>) -> Self {
-        Self::from_slice_with_strides(values, shape[0], shape[1], strides[0], strides[1])
+    /// The matrix as it is stored.
+    fn stored(self) -> DMatrixView<'a, f64> {
+        let (rows, columns) = (Dyn(self.rows), Dyn(self.columns));
+        DMatrixView::from_slice_with_strides_generic(self.stored, rows, columns, Const::<1>, Dyn(self.stride))
     }
 }
 
@@ -46,7 +50,7 @@ pub(crate) fn view(matrix: &Matrix) -> View<'_> {
 
 /// A matrix in a slice.
 pub(crate) fn view_slice(values: &[f64], rows: usize, columns: usize) -> View<'_> {
-    View { values, shape: [rows, columns], strides: [1, rows] }
+    View { stored: values, rows, columns, stride: rows, transposed: false }
 }
 
 /// `a b`.
@@ -63,8 +67,19 @@ pub(crate) fn product_into(out: &mut Matrix, a: View<'_>, b: View<'_>) {
 
 /// Writes `a b` into `out`, column-major.
 pub(crate) fn product_into_slice(out: &mut [f64], a: View<'_>, b: View<'_>) {
+    // Small products of nalgebra want columns without gaps between their entries.
+    let (a_copy, b_copy);
+    let (mut left, mut right) = (a, b);
+    if a.transposed {
+        a_copy = a.stored().transpose();
+        left = view(&a_copy);
+    }
+    if b.transposed {
+        b_copy = b.stored().transpose();
+        right = view(&b_copy);
+    }
     let mut out = DMatrixViewMut::from_slice(out, a.nrows(), b.ncols());
-    out.gemm(1.0, &DMatrixView::from(a), &DMatrixView::from(b), 0.0);
+    out.gemm(1.0, &left.stored(), &right.stored(), 0.0);
 }
 
 /// Iterations for each eigenvalue after which there is none to be found; a handful is usual.

@@ -520,7 +520,7 @@ fn bound(lattice: &InducingShape, data: &GridData, weights: &[f64], component: u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gp::inducing::regression::axis_kernel;
+    use crate::gp::inducing::node_covariance::axis_kernel;
     use nalgebra::{DMatrix, DVector};
 
     /// A smooth function of the box on a small grid.

@@ -100,7 +100,7 @@ impl<'a> SeparableForm<'a> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fit", feature = "formats"))]
 mod tests {
     use super::*;
     use crate::formats::source::Source;
