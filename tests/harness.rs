@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -58,20 +59,20 @@ impl Cli {
         Run::from(self.command(arguments).output().unwrap())
     }
 
-    /// Runs what must succeed without a word on standard error; its standard output.
+    /// Runs a command that must succeed and write nothing to standard error. Returns its standard output.
     pub(crate) fn ok<S: AsRef<OsStr> + std::fmt::Debug>(&self, arguments: &[S]) -> String {
         let run = self.run(arguments);
         assert!(run.code == Some(0) && run.stderr.is_empty(), "{arguments:?}: {run:?}");
         run.stdout
     }
 
-    /// Runs what must print one JSON document, and nothing else.
+    /// Runs a command that must print one JSON document and nothing else.
     pub(crate) fn json<S: AsRef<OsStr> + std::fmt::Debug>(&self, arguments: &[S]) -> Value {
         serde_json::from_str(&self.ok(arguments)).unwrap()
     }
 
-    /// Runs what must fail with exit code 1, one line of error and no change to any file; that line without
-    /// `error: `.
+    /// Runs a command that must fail with exit code 1, one line of error and no change to any file. Returns
+    /// that line without `error: `.
     pub(crate) fn fails<S: AsRef<OsStr> + std::fmt::Debug>(&self, arguments: &[S]) -> String {
         let before = self.tree();
         let run = self.run(arguments);
@@ -83,7 +84,7 @@ impl Cli {
         line["error: ".len()..].to_owned()
     }
 
-    /// Runs what must be refused for its usage, exit code 2; the whole message.
+    /// Runs a command that must be refused with exit code 2 for its usage. Returns the whole message.
     pub(crate) fn misused<S: AsRef<OsStr> + std::fmt::Debug>(&self, arguments: &[S]) -> String {
         let before = self.tree();
         let run = self.run(arguments);
@@ -93,12 +94,12 @@ impl Cli {
         run.stderr
     }
 
-    /// Every file and folder below the folder; sizes and times of files.
+    /// Every file and folder below the folder, with the sizes and times of files.
     fn tree(&self) -> BTreeMap<PathBuf, Option<(u64, std::time::SystemTime)>> {
         let mut found = BTreeMap::new();
         let mut open = vec![self.folder.path().to_owned()];
         while let Some(folder) = open.pop() {
-            // A folder that a test has locked keeps its secrets.
+            // A folder that a test has locked cannot be listed.
             for entry in fs::read_dir(&folder).into_iter().flatten() {
                 let path = entry.unwrap().path();
                 let metadata = fs::symlink_metadata(&path).unwrap();
@@ -131,14 +132,19 @@ impl From<Output> for Run {
     }
 }
 
-/// The shared measurements: `GPBRDF_DATA`, or `../shared/data` beside the workspace.
+/// The shared measurements: `GPBRDF_DATA`, or `../shared/data` beside the workspace. Without them the test is
+/// skipped, which a line on standard error says even if the test passes; with `GPBRDF_REQUIRE_DATA=1` it
+/// fails.
 pub(crate) fn data_dir() -> Option<PathBuf> {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let folder = std::env::var_os("GPBRDF_DATA").map_or(beside, PathBuf::from);
     if folder.is_dir() {
         return Some(folder);
     }
-    eprintln!("skipped: no GPBRDF_DATA and no ../shared/data");
+    let found = "no GPBRDF_DATA and no ../shared/data";
+    assert!(!std::env::var("GPBRDF_REQUIRE_DATA").is_ok_and(|v| v == "1"), "{found}");
+    // Not by `eprintln!`, which is captured.
+    std::io::stderr().write_all(format!("skipped: {found}\n").as_bytes()).unwrap();
     None
 }
 

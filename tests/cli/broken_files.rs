@@ -1,9 +1,10 @@
-//! Damaged, foreign and absent files: exit code 1, one line that names file, expectation and finding, and nothing
-//! written.
+//! Damaged, foreign and absent files: exit code 1, one line that names the file, what was expected and what
+//! was found, and no file written.
 
 use std::sync::OnceLock;
 
-use gpbrdf_core::{BrdfTable, write_merl_to};
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::write_merl_to;
 
 use crate::harness::{Cli, data_dir};
 
@@ -23,7 +24,7 @@ fn merl() -> &'static [u8] {
     })
 }
 
-const KINDS: &str = "a MERL .binary, RGL .bsdf, Cornell .brdf, samples CSV, table EXR or gpbrdf model";
+const KINDS: &str = "one of RGL .bsdf, table EXR, gpbrdf model, samples CSV, Cornell .brdf, MERL .binary";
 
 #[test]
 fn what_is_no_measurement() {
@@ -93,8 +94,8 @@ fn damaged_merl_files() {
         &cli,
         "a.binary",
         &file(
-            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel R, \
-             theta_h 0, theta_d 0, phi_d 0",
+            "finite numbers within the range of f32, found 4374000 values that are not, the first in channel \
+             R, theta_h 0, theta_d 0, phi_d 0",
         ),
     );
     cli.write("a.binary", filled(-1.0));
@@ -125,8 +126,8 @@ fn damaged_models() {
     };
     cli.write("m.safetensors", with(&header.replace("\"gpbrdf\"", "\"format\""), tensors));
     refused(&cli, "m.safetensors", &file("the metadata entry \"gpbrdf\", found none"));
-    cli.write("m.safetensors", with(&header.replacen("\\\"version\\\":1", "\\\"version\\\":7", 1), tensors));
-    refused(&cli, "m.safetensors", &file("version 1, found version 7"));
+    cli.write("m.safetensors", with(&header.replacen("\\\"version\\\":2", "\\\"version\\\":7", 1), tensors));
+    refused(&cli, "m.safetensors", &file("version 2, found version 7"));
 
     // The second number of the first tensor.
     let mut broken = tensors.to_vec();

@@ -2,6 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::write_merl;
+
 use crate::harness::{Cli, metric};
 
 #[test]
@@ -56,6 +59,31 @@ fn scattered_layouts_are_seeded() {
         let first = fit(layout, "1", "a.safetensors");
         assert!(first == fit(layout, "1", "b.safetensors"), "{layout}: same seed, other model");
         assert!(first != fit(layout, "2", "c.safetensors"), "{layout}: other seed, same model");
+    }
+}
+
+#[test]
+fn the_symmetry_is_measured_on_every_layout() {
+    let cli = Cli::new();
+    // phi_d and 180 degrees - phi_d are not alike.
+    let skewed =
+        BrdfTable::from_fn(|a| [1.0 + 0.5 * a.theta_h.sin() * a.theta_d.sin() * (2.0 * a.phi_d).sin(); 3]);
+    write_merl(cli.path("skewed.binary"), &skewed).unwrap();
+    let fit = |input: &str, layout: &str, symmetry: &str, name: &str| {
+        let options = ["--layout", layout, "--symmetry", symmetry, "--samples", "60", "-o", name];
+        let run = cli.run(&[&["-v", "fit", input], &options[..]].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let said = run.stderr.lines().find_map(|line| line.strip_prefix("symmetry: ")).unwrap().to_owned();
+        (said, cli.read(name))
+    };
+    for layout in ["lattice", "random", "cells"] {
+        assert_eq!(fit("phong", layout, "auto", "a.safetensors").0, "Bilateral", "{layout}");
+        let (said, measured) = fit("skewed.binary", layout, "auto", "a.safetensors");
+        assert_eq!(said, "Reciprocal", "{layout}");
+        let (said, by_hand) = fit("skewed.binary", layout, "bilateral", "b.safetensors");
+        assert_eq!(said, "Bilateral", "{layout}");
+        assert!(measured != by_hand, "{layout}: the symmetry changes nothing");
+        assert!(measured == fit("skewed.binary", layout, "reciprocal", "c.safetensors").1, "{layout}");
     }
 }
 

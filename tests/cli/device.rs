@@ -1,10 +1,11 @@
 //! `--backend` and `shader`.
 
-use gpbrdf_core::{Metrics, read_merl};
+use gpbrdf_core::Metrics;
+use gpbrdf_core::formats::read_merl;
 
 use crate::harness::Cli;
 
-/// Whether there is a device; says so where there is none, and insists where `GPBRDF_REQUIRE_GPU` is 1.
+/// Whether there is a device. Without one it says so, or panics if `GPBRDF_REQUIRE_GPU` is 1.
 fn has_device() -> bool {
     match gpbrdf_render::Context::open(gpbrdf_render::AdapterChoice::Any) {
         Ok(_) => true,

@@ -51,6 +51,9 @@ fn sizes_and_sources_that_do_not_fit_are_refused() {
     fails(&["fit", "red-plastic", "--floats", "99", "--solver", "dense"], "--solver: expected its default");
     fails(&["fit", "red-plastic", "--floats", "99", "--picture-weight", "2"], "0 to 1");
     cli.ok(&["convert", "red-plastic", "s.csv", "--samples", "64", "-q"]);
-    fails(&["fit", "s.csv", "--floats", "99"], "expected a whole table");
+    fails(
+        &["fit", "s.csv", "--floats", "99"],
+        "expected a BRDF that can be evaluated at any directions, found scattered samples",
+    );
     assert!(!cli.path("model.safetensors").exists());
 }

@@ -6,7 +6,7 @@ use crate::harness::Cli;
 
 const HEADER: &str = "theta_i,phi_i,theta_o,phi_o,r,g,b\n";
 
-/// Bakes a CSV file without pictures; the report.
+/// Bakes a CSV file without pictures and returns the report.
 fn bake(cli: &Cli, rows: &str) -> Value {
     cli.write("s.csv", format!("{HEADER}{rows}"));
     let run = cli.run(&["bake", "s.csv", "-o", "out", "--no-images", "--json"]);
@@ -29,7 +29,7 @@ fn few_and_degenerate_samples_still_give_a_table() {
         let report = bake(&cli, rows);
         assert_eq!(report["samples"], rows.lines().count());
         assert!(report["log_marginal_likelihood"].as_f64().is_some(), "{report:#}");
-        let table = gpbrdf_core::read_merl(cli.path("out/table.binary")).unwrap();
+        let table = gpbrdf_core::formats::read_merl(cli.path("out/table.binary")).unwrap();
         assert!(table.values().as_flattened().iter().all(|x| x.is_finite() && *x >= 0.0), "{rows}");
     }
     // A single value, or nothing but black, is predicted everywhere.
@@ -37,7 +37,7 @@ fn few_and_degenerate_samples_still_give_a_table() {
         [("10,0,20,180,1,2,3\n", [1.0, 2.0, 3.0]), ("10,0,20,180,0,0,0\n30,0,20,180,0,0,0\n", [0.0; 3])]
     {
         bake(&cli, rows);
-        let table = gpbrdf_core::read_merl(cli.path("out/table.binary")).unwrap();
+        let table = gpbrdf_core::formats::read_merl(cli.path("out/table.binary")).unwrap();
         for value in [table.cell(0, 0, 0), table.cell(45, 45, 90)] {
             for c in 0..3 {
                 assert!((value[c] - expected[c]).abs() < 1e-4, "{value:?} for {rows}");

@@ -1,4 +1,4 @@
-//! `render`: pictures without a window. Skipped, and said so, where there is no graphics adapter.
+//! `render`: pictures without a window. The tests are skipped, and say so, if there is no graphics adapter.
 
 use crate::harness::Cli;
 

@@ -190,6 +190,7 @@ fn check_beyond(cli: &Cli, with_data: bool) {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_keeps_what_is_done_and_goes_on_from_there() {
+    use std::io::{BufRead, BufReader};
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};
     let cli = Cli::new();
@@ -210,12 +211,12 @@ fn an_interrupted_run_keeps_what_is_done_and_goes_on_from_there() {
         "{names:?}"
     );
     // The same command takes table 1 from there and begins table 2.
-    let child = cli.command(&options).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    std::thread::sleep(Duration::from_secs(2));
+    let mut child = cli.command(&options).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.starts_with("table1: taken from"), "{first}");
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130));
-    assert!(String::from_utf8(output.stdout).unwrap().starts_with("table1: taken from"));
+    assert_eq!(child.wait().unwrap().code(), Some(130));
     assert_eq!(cli.names("out"), names);
 }
 

@@ -122,15 +122,15 @@ fn names_of_outputs_choose_their_format() {
         (&["slice", "lambert", "--phi-d", "nan"], "--phi-d: expected a finite number, found NaN"),
         (
             &["convert", "s.csv", "t.binary"],
-            "s.csv: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead",
+            "s.csv: expected a BRDF that can be evaluated at any directions, found scattered samples; bake them first",
         ),
         (
             &["slice", "s.csv", "-o", "t.png"],
-            "s.csv: expected a BRDF that can be asked anywhere, found scattered samples; fit them first",
+            "s.csv: expected a BRDF that can be evaluated at any directions, found scattered samples; bake them first",
         ),
         (
             &["eval", "s.csv", "lambert"],
-            "s.csv: expected a table, a model or a BRDF that can be asked anywhere, found scattered samples",
+            "s.csv: expected a BRDF that can be evaluated at any directions, found scattered samples; bake them first",
         ),
         (&["convert", "lambert", "folder.csv"], "cannot write \"folder.csv\": is a directory"),
         (

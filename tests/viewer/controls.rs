@@ -128,7 +128,7 @@ fn tab_reaches_every_control() {
     }
 }
 
-/// Sets every slider that is shown and asks it back by Ctrl + click.
+/// Moves every slider that is shown and resets it by Ctrl + click.
 fn restore_all(driver: &mut Driver, skip: &[&str]) -> usize {
     let sliders = |driver: &Driver| -> Vec<(String, f64, f64, f64)> {
         let nodes = driver.harness.root().children_recursive();

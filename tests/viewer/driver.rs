@@ -139,7 +139,7 @@ impl Driver {
         self.texts().iter().find_map(|t| t.strip_prefix(start).map(str::to_owned))
     }
 
-    /// What a slider is at.
+    /// The value of a slider.
     pub(crate) fn value(&self, label: &str) -> f64 {
         let slider = self.harness.get_by_role_and_label(Role::Slider, label);
         slider.accesskit_node().numeric_value().unwrap()
@@ -179,6 +179,6 @@ pub(crate) fn crop(picture: &image::RgbaImage, rect: egui::Rect) -> image::RgbaI
 
 /// Width, height and pixels of an EXR file.
 pub(crate) fn read_exr(path: &Path) -> (usize, usize, Vec<[f32; 3]>) {
-    let picture = gpbrdf_core::Environment::read(path).unwrap();
+    let picture = gpbrdf_core::formats::read_environment(path).unwrap();
     (picture.width(), picture.height(), picture.pixels().to_vec())
 }

@@ -164,7 +164,7 @@ fn settings_and_sessions_bring_back_how_it_looked() {
     driver.press(Key::L);
     driver.press(Key::Num2);
     // As eframe keeps them from run to run.
-    let kept = serde_json::to_string(driver.viewer().settings()).unwrap();
+    let kept = serde_json::to_string(&driver.viewer().settings()).unwrap();
     let settings: Settings = serde_json::from_str(&kept).unwrap();
     let mut again = Driver::with(&[PathBuf::from("lambert")], [1440.0, 1000.0], settings);
     again.fitted();
@@ -183,7 +183,7 @@ fn settings_and_sessions_bring_back_how_it_looked() {
     same(&restored);
     assert!(restored.harness.query_by_label("Show ward").is_some());
     assert!(restored.harness.query_by_label("Show chalk").is_some());
-    assert!(restored.viewer().settings() != &Settings::default());
+    assert!(restored.viewer().settings() != Settings::default());
     // A session whose file is gone names it and opens the rest.
     let text = std::fs::read_to_string(&session).unwrap();
     let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();

@@ -49,7 +49,7 @@ fn double_click(driver: &mut Driver, at: Pos2) {
     driver.harness.run_steps(2);
 }
 
-/// What sliders in a menu are at.
+/// The values of sliders in a menu.
 fn read(driver: &mut Driver, menu: &str, names: &[&str]) -> Vec<f64> {
     driver.click(menu);
     let found = names.iter().map(|name| driver.value(name)).collect();
@@ -83,7 +83,7 @@ fn the_sphere_turns_zooms_swipes_and_is_reset() {
 
 #[test]
 fn an_object_is_orbited_and_its_light_turned_with_ctrl() {
-    let settings = "{\"arrangement\": \"Sphere\", \"shape\": \"Knot\"}";
+    let settings = "{\"view\": \"3d\", \"panes\": {\"3d\": {\"shape\": \"Knot\"}}}";
     let mut driver = Driver::set(&[PathBuf::from("lambert")], [760.0, 460.0], settings);
     driver.slide("Samples", 1500.0);
     driver.fitted();

@@ -17,14 +17,14 @@ const SIZE: [f32; 2] = [760.0, 460.0];
 
 /// A window on an object of a material with few samples, so that the prediction is not the truth.
 fn object(settings: &str) -> Driver {
-    let mut driver =
-        Driver::set(&[PathBuf::from("ward")], SIZE, &format!("{{\"arrangement\": \"Sphere\", {settings}}}"));
+    let settings = format!("{{\"view\": \"3d\", \"panes\": {{\"3d\": {{{settings}}}}}}}");
+    let mut driver = Driver::set(&[PathBuf::from("ward")], SIZE, &settings);
     driver.slide("Samples", 100.0);
     driver.fitted();
     driver
 }
 
-/// How many samples the metrics that are shown belong to; none before there are any.
+/// The number of samples per pixel of the picture whose metrics are shown; `None` before there are metrics.
 fn measured_samples(driver: &Driver) -> Option<u32> {
     let text = driver.after("SSIM ")?;
     text.split_once(" at ")?.1.split(' ').next()?.parse().ok()
@@ -68,7 +68,7 @@ fn metrics_follow_the_picture_from_its_first_samples_on() {
 
 #[test]
 fn side_by_side_shows_two_whole_objects_and_a_swipe_one() {
-    let mut driver = object("\"shape\": \"Knot\", \"sphere\": \"SideBySide\"");
+    let mut driver = object("\"shape\": \"Knot\", \"shown\": \"SideBySide\"");
     driver.wait("a picture", |d| measured_samples(d) >= Some(16));
     let halves = |driver: &mut Driver| {
         let rect = driver.harness.get_by_label_contains("Object view").rect().shrink(6.0);
@@ -138,7 +138,7 @@ fn object_files_and_maps_are_read_and_broken_ones_named() {
     std::fs::write(path("broken.obj"), "v 0 0\nf 1 2 9\n").unwrap();
     std::fs::write(path("broken.hdr"), "#?RADIANCE\nnothing").unwrap();
     let mut map = std::io::Cursor::new(Vec::new());
-    gpbrdf_core::write_image_exr(&mut map, 16, 8, &[[0.4, 0.5, 0.6]; 128]).unwrap();
+    gpbrdf_core::formats::write_image_exr(&mut map, 16, 8, &[[0.4, 0.5, 0.6]; 128]).unwrap();
     std::fs::write(path("sky.exr"), map.into_inner()).unwrap();
     let mut driver = object("\"shape\": \"Knot\"");
     driver.wait("a picture", |d| measured_samples(d) >= Some(1));
@@ -158,7 +158,7 @@ fn object_files_and_maps_are_read_and_broken_ones_named() {
     driver.click("Dismiss");
     load(&mut driver, "Shape", "OBJ file…", "broken.obj");
     driver.wait("a message", |d| d.shows("broken.obj"));
-    // The sphere is shown in its place, and objects are to be had again.
+    // The sphere is shown in its place, and objects can be chosen again.
     driver.wait("a sphere", |d| d.harness.query_by_label_contains("Sphere view").is_some());
     driver.click("Shape");
     driver.harness.get_by_label("Knot").click();
@@ -173,9 +173,10 @@ fn a_lost_device_is_reported_and_opened_anew() {
     let context = Context::open(AdapterChoice::Any).unwrap();
     let theirs = context.clone();
     let mut driver = Driver::around(SIZE, move |ctx| {
-        let settings = serde_json::from_str("{\"arrangement\": \"Sphere\", \"shape\": \"Knot\"}").unwrap();
+        let settings = "{\"view\": \"3d\", \"panes\": {\"3d\": {\"shape\": \"Knot\"}}}";
+        let settings = serde_json::from_str(settings).unwrap();
         let mut viewer = Viewer::new(ctx, settings, &[PathBuf::from("ward")]).unwrap();
-        viewer.use_device(theirs).unwrap();
+        viewer.use_device(&theirs).unwrap();
         viewer
     });
     driver.slide("Samples", 100.0);

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use eframe::egui::accesskit::Role;
 use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT, Queryable};
-use gpbrdf_core::{BrdfTable, ExrPart, write_merl, write_table_exr};
+use gpbrdf_core::BrdfTable;
+use gpbrdf_core::formats::{ExrPart, write_merl, write_table_exr};
 
 use super::driver::{Driver, crop};
 
@@ -62,12 +63,12 @@ fn dropped_files_are_opened_once_and_stay_among_the_recent_ones() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("dropped.safetensors");
     let table = gpbrdf_core::Source::built_in("red-plastic").unwrap().table().unwrap().into_owned();
-    let options = gpbrdf_core::TableFitOptions {
+    let options = gpbrdf_core::CompressOptions {
         size: gpbrdf_core::InducingSize::Shape([6, 5, 4]),
-        ..gpbrdf_core::TableFitOptions::default()
+        ..gpbrdf_core::CompressOptions::default()
     };
     let provenance = gpbrdf_core::Provenance { material: "squeezed".into(), ..Default::default() };
-    let (model, _) = gpbrdf_core::fit_table(&table, &options, provenance).unwrap();
+    let model = gpbrdf_core::compress(&table, &options, provenance).unwrap().model;
     std::fs::write(&path, model.to_bytes().unwrap()).unwrap();
 
     let mut driver = Driver::new(&[PathBuf::from("lambert")]);
@@ -97,7 +98,7 @@ fn files_of_every_kind_are_opened_at_once() {
         name: "mean",
         description: "test",
         unit: "sr^-1",
-        channels: gpbrdf_core::ExrChannels::Rgb(grey.values()),
+        channels: gpbrdf_core::formats::ExrChannels::Rgb(grey.values()),
     };
     write_table_exr(path("layers.exr"), &[mean]).unwrap();
     let rows = (0..60).map(|i| format!("{},{},{},0.1,0.2,0.3\n", i % 30, (7 * i) % 50, (13 * i) % 180));

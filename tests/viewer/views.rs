@@ -50,7 +50,7 @@ fn hovered_values_are_those_of_the_model() {
             let numbers = texts[at + 1].split_whitespace();
             numbers.map(|x| x.trim_end_matches('°').parse().unwrap()).collect()
         };
-        // The values stand at the end, after what else may be called so.
+        // The values are the last texts; other texts may have the same names.
         let texts_from = texts.iter().rposition(|t| t == "θh").unwrap();
         let texts = &texts[texts_from..];
         let angle = |name: &str| -> f64 {
@@ -58,7 +58,7 @@ fn hovered_values_are_those_of_the_model() {
             texts[at + 1].trim_end_matches('°').parse::<f64>().unwrap().to_radians()
         };
         let angles = HalfDiff { theta_h: angle("θh"), theta_d: angle("θd"), phi_d: angle("φd") };
-        let expected = model.predict(&[angles], IntervalOf::Observation)[0];
+        let expected = model.predict(&[angles], IntervalOf::Observation).unwrap()[0];
         let pairs = [
             ("truth", truth.brdf().unwrap().eval_half_diff(angles)),
             ("mean", expected.mean),
@@ -146,7 +146,7 @@ fn pictures_are_as_they_were() {
     let compare = |driver: &mut Driver, name: &str| {
         driver.wait("everything", |d| d.viewer().is_settled());
         driver.harness.run_steps(20);
-        // Smaller: what stands where, and every picture, but few bytes in the repository.
+        // A smaller picture shows the layout and every image, and takes few bytes in the repository.
         let picture = driver.picture();
         let size = [picture.width() * 2 / 5, picture.height() * 2 / 5];
         let filter = image::imageops::FilterType::Triangle;

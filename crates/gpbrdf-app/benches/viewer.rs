@@ -1,7 +1,7 @@
 //! How fast the viewer answers: `cargo bench -p gpbrdf-app --bench viewer`.
 //!
-//! Without a window: from a slider's move to the frame that shows the new model at 36,864 samples, the longest frame of
-//! the window's own work meanwhile, and memory over 200 refits.
+//! Without a window: from a slider's move to the frame that shows the new model at 36,864 samples, the
+//! longest frame of the window's own work meanwhile, and memory over 200 refits.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a bench reports to a terminal")]
 
 use std::time::{Duration, Instant};
@@ -64,7 +64,8 @@ fn open(settings: Settings) -> Driver {
 
 /// Frames while an object is lit and measured and the model refitted.
 fn with_an_object() {
-    let mut driver = open(serde_json::from_str("{\"shape\": \"Knot\", \"sphere\": \"SideBySide\"}").unwrap());
+    let settings = "{\"panes\": {\"3d\": {\"shape\": \"Knot\", \"shown\": \"SideBySide\"}}}";
+    let mut driver = open(serde_json::from_str(settings).unwrap());
     until(&mut driver, Viewer::is_fitted);
     driver.state_mut().as_mut().unwrap().reset_frame_times();
     for i in 0..20 {

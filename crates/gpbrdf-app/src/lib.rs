@@ -4,5 +4,8 @@
 #![expect(clippy::doc_markdown, reason = "descriptions of arguments are shown to people as they are")]
 
 pub mod cli;
+mod job;
+mod output;
+mod reproduce;
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -11,8 +11,8 @@ fn lattice(c: &mut Criterion) {
     let mut group = c.benchmark_group("lattice_36864_rgb");
     group.sample_size(20);
     // A measurement where one is given, else a built-in material.
-    let source = std::env::var_os("GPBRDF_BENCH_INPUT")
-        .map_or_else(|| Source::built_in("cherry-235"), |path| Source::open(path));
+    let source =
+        std::env::var_os("GPBRDF_BENCH_INPUT").map_or_else(|| Source::built_in("cherry-235"), Source::open);
     let Ok(source) = source else {
         eprintln!("skipped: GPBRDF_BENCH_INPUT cannot be read");
         return;

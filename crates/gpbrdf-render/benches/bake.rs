@@ -1,22 +1,21 @@
-//! Baking on the device: a lattice model of 64 x 32 x 18 nodes and a dense model, RGB, each until the texture is written.
+//! Baking on the device until the texture is written: a lattice model of 64 x 32 x 18 nodes and a dense
+//! model, both RGB.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::ops::ControlFlow;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use gpbrdf_core::{
-    FitOptions, InputSpace, LatticeLayout, Layout, Model, OptimizeOptions, Provenance, SampleSet, Solver,
-    Source, fit,
-};
+use gpbrdf_core::gp::OptimizeOptions;
+use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Model, Solver, Source, fit};
 use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision};
 
 fn model(layout: &Layout, solver: Solver) -> Option<Model> {
     let source = Source::built_in("cherry-235").ok()?;
-    let samples = SampleSet::measure(source.brdf()?, layout).ok()?;
+    let samples = source.measure(layout).ok()?;
     let optimize = OptimizeOptions { max_iterations: 8, ..OptimizeOptions::default() };
-    let space: InputSpace = LatticeLayout::default().space();
+    let space = LatticeLayout::default().space().into();
     let options = FitOptions { solver, optimize, space, ..FitOptions::default() };
-    Some(fit(&samples, &options, Provenance::default()).ok()?.0)
+    Some(fit(&samples, &options).ok()?.model)
 }
 
 fn bake(c: &mut Criterion) {

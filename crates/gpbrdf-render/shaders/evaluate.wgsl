@@ -1,7 +1,8 @@
-// An entry point for the lookup: values at pairs of directions in a buffer. Comes after lookup.wgsl.
+// An entry point for the lookup: the values for pairs of directions in a buffer.
+// Needs shared/table.wgsl and shared/angles.wgsl.
 
 struct GpbrdfDirections {
-    // The fourth components are not used.
+    // The fourth components are unused.
     wi: vec4f,
     wo: vec4f,
 }

@@ -6,25 +6,25 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 
-/// How long a piece of work may keep the device before it counts as stuck.
+/// How long the device may work before it is taken for stuck.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Waits for everything.
+/// Waits for everything that was submitted.
 const WAIT: wgpu::PollType = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
 
-/// Which adapter to take.
+/// Which adapter to use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// The fastest there is, a software one if there is no other.
+    /// The fastest one, which may be a program on the processor.
     #[default]
     Any,
-    /// A GPU or none.
+    /// A GPU only.
     Hardware,
 }
 
 /// A graphics device and its queue: one of its own, or one that a window or another renderer has opened.
 ///
-/// Only what is used is asked for, and only where it is there: filtering of 32-bit textures
+/// Two features are requested, and only where the adapter has them: filtering of 32-bit textures
 /// ([`Context::float32_filterable`]) and arithmetic in f64 ([`Context::f64_arithmetic`]).
 #[derive(Clone)]
 pub struct Context {
@@ -42,19 +42,20 @@ impl fmt::Debug for Context {
 }
 
 impl Context {
-    /// The features this crate makes use of where they are there.
+    /// The features that this crate uses where the adapter has them.
     pub const OPTIONAL_FEATURES: wgpu::Features =
         wgpu::Features::FLOAT32_FILTERABLE.union(wgpu::Features::SHADER_F64);
 
-    /// The limits this crate asks of an adapter: those of modest devices, and of buffers and pictures what there is.
+    /// The limits that this crate requests: those of modest devices, but for buffers and pictures the largest
+    /// sizes of the adapter.
     #[must_use]
     pub fn required_limits(adapter: &wgpu::Adapter) -> wgpu::Limits {
-        let there = adapter.limits();
+        let most = adapter.limits();
         wgpu::Limits {
-            max_buffer_size: there.max_buffer_size,
-            max_storage_buffer_binding_size: there.max_storage_buffer_binding_size,
-            max_storage_buffers_per_shader_stage: there.max_storage_buffers_per_shader_stage.min(8),
-            ..wgpu::Limits::downlevel_defaults().using_resolution(there)
+            max_buffer_size: most.max_buffer_size,
+            max_storage_buffer_binding_size: most.max_storage_buffer_binding_size,
+            max_storage_buffers_per_shader_stage: most.max_storage_buffers_per_shader_stage.min(8),
+            ..wgpu::Limits::downlevel_defaults().using_resolution(most)
         }
     }
 
@@ -62,7 +63,7 @@ impl Context {
     /// `WGPU_ADAPTER_NAME` (a part of the name) narrow the choice.
     ///
     /// # Errors
-    /// [`Error::NoAdapter`] where there is none, [`Error::Device`] where it does not open.
+    /// [`Error::NoAdapter`] when no adapter is suitable, [`Error::Device`] when it opens no device.
     pub fn open(choice: AdapterChoice) -> Result<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let adapter = choose(&instance, choice)?;
@@ -81,8 +82,8 @@ impl Context {
         Ok(context)
     }
 
-    /// Works on a device that somebody else has opened on `adapter`; its features decide what is used. That
-    /// somebody also hears of its loss.
+    /// Works on a device that the caller has opened on `adapter`. Its features decide which of the optional
+    /// ones are used. The caller, not this context, is notified when the device is lost.
     #[must_use]
     pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self { device, queue, info: adapter.get_info(), lost: Arc::default() }
@@ -100,7 +101,7 @@ impl Context {
         &self.queue
     }
 
-    /// The adapter it is on.
+    /// The adapter of the device.
     #[must_use]
     pub fn info(&self) -> &wgpu::AdapterInfo {
         &self.info
@@ -119,7 +120,7 @@ impl Context {
         format!("{}, {:?}, {kind}", self.info.name, self.info.backend)
     }
 
-    /// Whether it is a GPU, not a program on the processor.
+    /// Whether the adapter is a GPU, not a program on the processor.
     #[must_use]
     pub fn is_hardware(&self) -> bool {
         is_hardware(&self.info)
@@ -137,11 +138,11 @@ impl Context {
         self.device.features().contains(wgpu::Features::SHADER_F64)
     }
 
-    /// Does `work` and answers with what the device had against it.
+    /// Runs `work` and turns what the device reports meanwhile into an error. `what` names the work in the
+    /// message.
     ///
     /// # Errors
-    /// [`Error::OutOfMemory`], [`Error::Lost`], or [`Error::Gpu`] when the device rejects a part of it. `what` names
-    /// the work in the message.
+    /// [`Error::OutOfMemory`], [`Error::Lost`], or [`Error::Gpu`] when the device rejects a part of the work.
     pub fn guard<T>(&self, what: &str, work: impl FnOnce() -> T) -> Result<T> {
         use wgpu::ErrorFilter::{Internal, OutOfMemory, Validation};
         let scopes = [Internal, OutOfMemory, Validation].map(|filter| self.device.push_error_scope(filter));
@@ -152,8 +153,8 @@ impl Context {
             first = first.or(error);
         }
         if first.is_some() {
-            // The loss that it may come from is told once nothing is left to do.
-            let _told = self.device.poll(WAIT);
+            // A lost device may be the cause. It is reported when the device is polled.
+            let _polled = self.device.poll(WAIT);
         }
         self.check_lost(what)?;
         match first {
@@ -182,7 +183,7 @@ impl Context {
         done.map(drop).map_err(|error| Error::Lost { what: what.to_owned(), message: error.to_string() })
     }
 
-    /// A pipeline out of WGSL, with the layout that the shader implies.
+    /// A pipeline from WGSL, with the layout that the shader implies.
     ///
     /// # Errors
     /// Those of [`Context::guard`].
@@ -203,14 +204,14 @@ impl Context {
         })
     }
 
-    /// Binds `resources` to group 0 of a pipeline, in the order of their bindings.
-    pub(crate) fn bind_group<const N: usize>(
+    /// Binds resources to the given bindings of group 0 of a pipeline.
+    pub(crate) fn bind_group<'a>(
         &self,
         pipeline: &wgpu::ComputePipeline,
-        resources: [wgpu::BindingResource<'_>; N],
+        resources: impl IntoIterator<Item = (u32, wgpu::BindingResource<'a>)>,
     ) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(resources)
+        let entries: Vec<_> = resources
+            .into_iter()
             .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         self.device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -226,15 +227,10 @@ impl Context {
         pipeline: &wgpu::ComputePipeline,
         buffers: &[(u32, &wgpu::Buffer)],
     ) -> wgpu::BindGroup {
-        let entries: Vec<_> = buffers
-            .iter()
-            .map(|&(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
+        self.bind_group(
+            pipeline,
+            buffers.iter().map(|&(binding, buffer)| (binding, buffer.as_entire_binding())),
+        )
     }
 
     /// Submits one dispatch.
@@ -253,10 +249,10 @@ impl Context {
         self.queue.submit([encoder.finish()]);
     }
 
-    /// A buffer that holds `bytes`, padded with zeros to at least 16 and a multiple of 4.
+    /// A buffer that holds `bytes`, padded with zeros to at least 16 bytes and to a multiple of 4.
     ///
     /// # Errors
-    /// [`Error::Limit`] over the device's largest binding, and those of [`Context::guard`].
+    /// [`Error::Limit`] above the largest binding of the device, and those of [`Context::guard`].
     pub fn buffer_of(
         &self,
         label: &'static str,
@@ -277,15 +273,15 @@ impl Context {
     /// A uniform buffer that holds `value`.
     ///
     /// # Errors
-    /// As [`Context::buffer_of`].
+    /// Those of [`Context::buffer_of`].
     pub(crate) fn uniform(&self, value: &impl bytemuck::NoUninit) -> Result<wgpu::Buffer> {
         self.buffer_of("uniforms", bytemuck::bytes_of(value), wgpu::BufferUsages::UNIFORM)
     }
 
-    /// A buffer of zeros, of at least 16 bytes.
+    /// A buffer of zeros, of at least 16 bytes and a multiple of 4.
     ///
     /// # Errors
-    /// As [`Context::buffer_of`].
+    /// Those of [`Context::buffer_of`].
     pub fn empty_buffer(
         &self,
         label: &'static str,
@@ -310,48 +306,6 @@ impl Context {
             })
         })
     }
-
-    /// The contents of a buffer with the usage `COPY_SRC`. Waits for the device.
-    ///
-    /// # Errors
-    /// Those of [`Context::guard`].
-    pub fn read_buffer(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
-        const WHAT: &str = "reading back";
-        let size = buffer.size();
-        let staging = self.empty_buffer(
-            "read-back buffer",
-            size,
-            wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        )?;
-        self.guard(WHAT, || {
-            let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, size);
-            self.queue.submit([encoder.finish()]);
-        })?;
-        self.read_mapped(&staging)
-    }
-
-    /// The contents of a buffer with the usage `MAP_READ`, once everything submitted is done.
-    pub(crate) fn read_mapped(&self, staging: &wgpu::Buffer) -> Result<Vec<u8>> {
-        const WHAT: &str = "reading back";
-        let failed = |message: String| Error::Gpu { what: WHAT.to_owned(), message };
-        let answer: Arc<OnceLock<_>> = Arc::default();
-        let set = answer.clone();
-        self.guard(WHAT, || {
-            staging.map_async(wgpu::MapMode::Read, .., move |result| {
-                let _set_once = set.set(result);
-            });
-        })?;
-        self.wait(WHAT)?;
-        match answer.get() {
-            Some(Ok(())) => {}
-            Some(Err(error)) => return Err(failed(error.to_string())),
-            None => return Err(failed("the device did not answer".to_owned())),
-        }
-        let bytes = staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?.to_vec();
-        staging.unmap();
-        Ok(bytes)
-    }
 }
 
 fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
@@ -361,8 +315,8 @@ fn is_hardware(info: &wgpu::AdapterInfo) -> bool {
     )
 }
 
-/// The best adapter with compute shaders: discrete before integrated before virtual before software, and Vulkan,
-/// Metal and DX12 before GL.
+/// The best adapter with compute shaders: discrete before integrated before virtual before software, and
+/// Vulkan, Metal and DX12 before GL.
 fn choose(instance: &wgpu::Instance, choice: AdapterChoice) -> Result<wgpu::Adapter> {
     let wanted = std::env::var("WGPU_ADAPTER_NAME").unwrap_or_default().to_lowercase();
     let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
@@ -389,24 +343,4 @@ fn choose(instance: &wgpu::Instance, choice: AdapterChoice) -> Result<wgpu::Adap
     all.into_iter().filter(usable).min_by_key(rank).ok_or_else(|| Error::NoAdapter {
         found: if names.is_empty() { "none".to_owned() } else { format!("only {}", names.join(", ")) },
     })
-}
-
-/// A device for tests, opened once.
-///
-/// `None`, said on standard error, where there is no adapter.
-///
-/// # Panics
-/// Without an adapter where `GPBRDF_REQUIRE_GPU` is 1.
-#[cfg(test)]
-pub(crate) fn test_context() -> Option<&'static Context> {
-    static CONTEXT: OnceLock<Option<Context>> = OnceLock::new();
-    let context = CONTEXT.get_or_init(|| match Context::open(AdapterChoice::Any) {
-        Ok(context) => Some(context),
-        Err(error) if std::env::var("GPBRDF_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("skipped: {error}");
-            None
-        }
-    });
-    context.as_ref()
 }

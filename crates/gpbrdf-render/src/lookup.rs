@@ -1,36 +1,26 @@
-//! The lookup of a baked BRDF as shader code for any renderer.
+//! The lookup of a baked BRDF in other shading languages, and on the device.
 
 use std::fmt;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::shader::evaluate_wgsl;
 use crate::texture::BrdfTexture;
 
-/// The functions `gpbrdf_coordinates`, `gpbrdf_lookup` and `gpbrdf_lookup_exact` in WGSL: directions to angles to
-/// texture. Needs nothing else; put it in front of a shader that uses it.
-pub const LOOKUP_WGSL: &str = include_str!("../shaders/lookup.wgsl");
-
-const EVALUATE_WGSL: &str = include_str!("../shaders/evaluate.wgsl");
 const ENTRY: &str = "gpbrdf_evaluate";
 
-/// [`LOOKUP_WGSL`] and the compute entry point `gpbrdf_evaluate`, which evaluates pairs of directions in a buffer.
-#[must_use]
-pub fn evaluate_wgsl() -> String {
-    format!("{LOOKUP_WGSL}\n{EVALUATE_WGSL}")
-}
-
-/// A shading language.
+/// A language of shaders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShaderLanguage {
-    /// WebGPU's.
+    /// The language of WebGPU.
     Wgsl,
-    /// OpenGL's, version 4.50 core.
+    /// The language of OpenGL, version 4.50 core.
     Glsl,
-    /// DirectX's, shader model 6.0.
+    /// The language of DirectX, shader model 6.0.
     Hlsl,
-    /// Metal's, version 2.0.
+    /// The language of Metal, version 2.0.
     Msl,
-    /// Vulkan's binary one, version 1.3, as little-endian words.
+    /// The binary language of Vulkan, version 1.3, as little-endian words.
     Spirv,
 }
 
@@ -46,10 +36,10 @@ impl fmt::Display for ShaderLanguage {
     }
 }
 
-/// [`evaluate_wgsl`] in another language, translated by naga; WGSL comes as it is.
+/// [`evaluate_wgsl`] in another language, translated by naga. WGSL is returned as it is.
 ///
 /// # Errors
-/// [`Error::Gpu`] when naga has no translation.
+/// [`Error::Gpu`] when naga cannot translate it.
 pub fn translate(language: ShaderLanguage) -> Result<Vec<u8>> {
     use naga::back::{glsl, hlsl, msl, spv};
     use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -105,8 +95,8 @@ pub fn translate(language: ShaderLanguage) -> Result<Vec<u8>> {
     })
 }
 
-/// Evaluates a filterable texture at pairs `[wi, wo]` of directions in the local frame (the fourth components are not
-/// used): the BRDF in sr^-1 and sigma. Waits for the device.
+/// Evaluates a filterable texture at pairs `[wi, wo]` of directions in the local frame, whose fourth
+/// components are unused: the BRDF in sr^-1 and sigma. Waits for the device.
 ///
 /// # Errors
 /// Those of [`Context::guard`].
@@ -132,10 +122,10 @@ pub fn evaluate(context: &Context, texture: &BrdfTexture, pairs: &[[[f32; 4]; 2]
     }
     context.guard(WHAT, || {
         let resources = [
-            wgpu::BindingResource::TextureView(texture.view()),
-            wgpu::BindingResource::Sampler(&sampler),
-            directions.as_entire_binding(),
-            values.as_entire_binding(),
+            (0, wgpu::BindingResource::TextureView(texture.view())),
+            (1, wgpu::BindingResource::Sampler(&sampler)),
+            (2, directions.as_entire_binding()),
+            (3, values.as_entire_binding()),
         ];
         let group = context.bind_group(&pipeline, resources);
         context.dispatch(&pipeline, &group, [groups, 1, 1]);
@@ -148,8 +138,9 @@ pub fn evaluate(context: &Context, texture: &BrdfTexture, pairs: &[[[f32; 4]; 2]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shader::LOOKUP_WGSL;
 
-    /// Runs a validator on a file; skips, and says so, where it is not installed.
+    /// Runs a validator on a file. Says on standard error that it is skipped if it is not installed.
     fn validate(bytes: &[u8], suffix: &str, program: &str, arguments: &[&str]) {
         let mut file = tempfile::Builder::new().suffix(suffix).tempfile().unwrap();
         std::io::Write::write_all(&mut file, bytes).unwrap();
@@ -161,14 +152,6 @@ mod tests {
                 String::from_utf8_lossy(&output.stderr)
             ),
             Err(error) => eprintln!("skipped: {program}: {error}"),
-        }
-    }
-
-    #[test]
-    fn the_lookup_stands_alone() {
-        let module = naga::front::wgsl::parse_str(LOOKUP_WGSL).unwrap();
-        for name in ["gpbrdf_coordinates", "gpbrdf_lookup", "gpbrdf_lookup_exact"] {
-            assert!(module.functions.iter().any(|(_, f)| f.name.as_deref() == Some(name)), "{name}");
         }
     }
 

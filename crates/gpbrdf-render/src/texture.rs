@@ -1,19 +1,21 @@
 //! A BRDF as a 3-D texture.
 
-use gpbrdf_core::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SigmaTable, cell_index};
+use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
 
 use crate::context::Context;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// How a texture stores its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
-    /// 16-bit floats, `rgba16float`: 11.7 MB, relative error up to 2^-11 from 6e-5 on, values up to 65,504. Every
-    /// device filters it.
+    /// 16-bit floats, `rgba16float`: 11.7 MB. Values are at most 65,504, and those above 6e-5 have a relative
+    /// error of at most 2^-11. Every device filters this format.
     #[default]
     Half,
-    /// 32-bit floats, `rgba32float`: 23.3 MB. Filtered where [`Context::float32_filterable`]; elsewhere only loads work.
+    /// 32-bit floats, `rgba32float`: 23.3 MB. Devices that are not [`Context::float32_filterable`] support
+    /// loads only.
     Single,
 }
 
@@ -27,7 +29,7 @@ impl Precision {
         }
     }
 
-    /// Bytes of a texel.
+    /// Bytes per texel.
     #[must_use]
     pub fn texel_bytes(self) -> u32 {
         match self {
@@ -37,8 +39,9 @@ impl Precision {
     }
 }
 
-/// 90 x 90 x 180 texels along `theta_h` (by its square root), `theta_d` and `phi_d`: the BRDF in sr^-1, and in alpha the
-/// standard deviation of the target, the largest of the channels where they differ. `lookup.wgsl` reads it.
+/// 90 x 90 x 180 texels along `theta_h` (by its square root), `theta_d` and `phi_d`: the BRDF in sr^-1, and
+/// in alpha the standard deviation of the target, the largest one where those of the channels differ. Shaders
+/// read it by [`LOOKUP_WGSL`](crate::LOOKUP_WGSL).
 #[derive(Clone, Debug)]
 pub struct BrdfTexture {
     texture: wgpu::Texture,
@@ -57,7 +60,7 @@ impl BrdfTexture {
     /// A texture of zeros, to be written by a compute shader.
     ///
     /// # Errors
-    /// Those of [`Context::guard`], out of memory among them.
+    /// Those of [`Context::guard`], such as [`Error::OutOfMemory`].
     pub fn empty(context: &Context, precision: Precision) -> Result<Self> {
         let texture = context.guard("BRDF texture", || {
             context.device().create_texture(&wgpu::TextureDescriptor {
@@ -78,8 +81,8 @@ impl BrdfTexture {
         Ok(Self { texture, view, precision })
     }
 
-    /// A table and, where there is one, its sigma. Cells without data take the value of their neighbours along `theta_d`
-    /// ([`BrdfTable::filled`]).
+    /// A texture of a table and, if given, of its sigma. Cells without data take the value of their
+    /// neighbours along `theta_d` ([`BrdfTable::filled`]).
     ///
     /// # Errors
     /// Those of [`BrdfTexture::empty`].
@@ -127,46 +130,25 @@ impl BrdfTexture {
         Ok(out)
     }
 
-    /// The texels in the order of a table's cells ([`cell_index`]): red, green, blue, sigma. Waits for the device.
+    /// The texels in the order of a table's cells ([`cell_index`]): red, green, blue, sigma. Waits for the
+    /// device.
     ///
     /// # Errors
     /// Those of [`Context::guard`].
     pub fn download(&self, context: &Context) -> Result<Vec<[f32; 4]>> {
-        let texel = self.precision.texel_bytes();
-        let row = (SIZE.width * texel).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let staging = context.empty_buffer(
-            "read-back buffer",
-            u64::from(row * SIZE.height * SIZE.depth_or_array_layers),
-            wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        )?;
-        context.guard("reading back a BRDF", || {
-            let mut encoder =
-                context.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.copy_texture_to_buffer(
-                self.texture.as_image_copy(),
-                wgpu::TexelCopyBufferInfo {
-                    buffer: &staging,
-                    layout: wgpu::TexelCopyBufferLayout {
-                        offset: 0,
-                        bytes_per_row: Some(row),
-                        rows_per_image: Some(SIZE.height),
-                    },
-                },
-                SIZE,
-            );
-            context.queue().submit([encoder.finish()]);
-        })?;
-        let bytes = context.read_mapped(&staging)?;
-        let mut out = vec![[0.0; 4]; N_CELLS];
-        for (line, bytes) in bytes.chunks_exact(row as usize).enumerate() {
-            for (h, bytes) in bytes.chunks_exact(texel as usize).take(N_THETA_H).enumerate() {
-                out[cell_index(h, line % N_THETA_D, line / N_THETA_D)] = match self.precision {
-                    Precision::Half => bytemuck::pod_read_unaligned::<[f16; 4]>(bytes).map(f16::to_f32),
-                    Precision::Single => bytemuck::pod_read_unaligned(bytes),
-                };
+        let texels: Vec<[f32; 4]> = match self.precision {
+            Precision::Half => {
+                let texels: Vec<[f16; 4]> = context.read_texture(&self.texture)?;
+                texels.into_iter().map(|texel| texel.map(f16::to_f32)).collect()
             }
+            Precision::Single => context.read_texture(&self.texture)?,
+        };
+        let mut cells = vec![[0.0; 4]; N_CELLS];
+        for (i, texel) in texels.into_iter().enumerate() {
+            let (line, h) = (i / N_THETA_H, i % N_THETA_H);
+            cells[cell_index(h, line % N_THETA_D, line / N_THETA_D)] = texel;
         }
-        Ok(out)
+        Ok(cells)
     }
 
     /// [`BrdfTexture::download`] as a table of the mean and one of sigma.
@@ -176,28 +158,22 @@ impl BrdfTexture {
     pub fn to_tables(&self, context: &Context) -> Result<(BrdfTable, SigmaTable)> {
         let (mean, sigma): (Vec<[f32; 3]>, Vec<f32>) =
             self.download(context)?.into_iter().map(|[r, g, b, sigma]| ([r, g, b], sigma)).unzip();
-        let cells = mean.len();
-        let tables = BrdfTable::from_values(mean).zip(SigmaTable::from_planes(vec![sigma]));
-        tables.ok_or_else(|| Error::InvalidArgument {
-            what: "texels of a BRDF",
-            expected: N_CELLS.to_string(),
-            found: cells.to_string(),
-        })
+        Ok((BrdfTable::from_values(mean)?, SigmaTable::from_planes(vec![sigma])?))
     }
 
-    /// What shaders bind.
+    /// The view that shaders bind.
     #[must_use]
     pub fn view(&self) -> &wgpu::TextureView {
         &self.view
     }
 
-    /// How it stores its numbers.
+    /// The precision of its numbers.
     #[must_use]
     pub fn precision(&self) -> Precision {
         self.precision
     }
 
-    /// Whether a sampler on this device can filter it; else `gpbrdf_lookup_exact` reads it.
+    /// Whether a sampler of this device can filter the texture. Otherwise use `gpbrdf_lookup_exact`.
     #[must_use]
     pub fn is_filterable(&self, context: &Context) -> bool {
         self.precision == Precision::Half || context.float32_filterable()
@@ -221,8 +197,14 @@ impl BrdfTexture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::context::test_context;
-    use gpbrdf_core::{Brdf as _, HalfDiff, direction};
+    use gpbrdf_core::brdf::direction;
+    use gpbrdf_core::{Brdf as _, HalfDiff};
+
+    crate::support::gpu_tests![
+        textures_come_back_as_they_were_sent,
+        cells_without_data_are_filled_before_upload,
+        shaders_look_up_what_the_table_holds,
+    ];
 
     fn table() -> BrdfTable {
         BrdfTable::from_fn(|a: HalfDiff| {
@@ -230,9 +212,7 @@ mod tests {
         })
     }
 
-    #[test]
-    fn textures_come_back_as_they_were_sent() {
-        let Some(context) = test_context() else { return };
+    fn textures_come_back_as_they_were_sent(context: &Context) {
         let table = table();
         let single = BrdfTexture::upload(context, &table, None, Precision::Single).unwrap();
         assert_eq!(single.to_tables(context).unwrap().0, table);
@@ -242,9 +222,7 @@ mod tests {
         }
     }
 
-    #[test]
-    fn cells_without_data_are_filled_before_upload() {
-        let Some(context) = test_context() else { return };
+    fn cells_without_data_are_filled_before_upload(context: &Context) {
         let mut values = table().values().to_vec();
         values[cell_index(3, 80, 7)] = [-1.0; 3];
         let torn = BrdfTable::from_values(values).unwrap();
@@ -253,9 +231,7 @@ mod tests {
         assert_eq!(found.cell(3, 80, 7), torn.cell(3, 79, 7));
     }
 
-    #[test]
-    fn shaders_look_up_what_the_table_holds() {
-        let Some(context) = test_context() else { return };
+    fn shaders_look_up_what_the_table_holds(context: &Context) {
         let table = table();
         let texture = BrdfTexture::upload(context, &table, None, Precision::Half).unwrap();
         let mut pairs: Vec<[[f32; 4]; 2]> = Vec::new();

@@ -1,26 +1,30 @@
-//! A run of everything, in which neither wgpu nor the driver's validation layer has anything to say.
+//! A run of everything, in which neither wgpu nor the validation layer of the driver logs a warning.
 //!
-//! Its own process: the logger and the debugging flags of the instance are global. The layer is that of Debian's
-//! vulkan-validationlayers; without it wgpu's own validation remains.
+//! This is a process of its own, because the logger and the debugging flags of the instance are global. The
+//! layer is in Debian's package vulkan-validationlayers; without it, the validation of wgpu itself remains.
 #![expect(clippy::unwrap_used, reason = "a test")]
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 
 use gpbrdf_core::{
-    BrdfTable, Environment, FitOptions, InducingSize, LatticeLayout, Layout, Model, Provenance, SampleSet,
-    Solver, Source, TableFitOptions, bake_mean, bake_sigma, fit, fit_table,
+    BrdfTable, CompressOptions, Environment, FitOptions, InducingSize, LatticeLayout, Layout, Model,
+    Provenance, Solver, Source, bake_mean, bake_sigma, compress, fit,
 };
 use gpbrdf_render::{
-    AdapterChoice, Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh,
-    Precision, Renderer, Sampling, ShadingOptions, Show, ToneCurve, evaluate,
+    Background, Baker, BrdfTexture, Camera, Context, Display, Geometry, Light, Mesh, Precision, Renderer,
+    Sampling, ShadingOptions, Show, ToneCurve, evaluate, glam,
 };
 
-/// What was logged at the level of a warning or above.
+#[path = "support/mod.rs"]
+mod support;
+
+/// Messages at the level of a warning or above.
 static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// What is not about this crate: no layer, one that is older than the number of WGSL among the languages of SPIR-V's debug
-/// information (`WGPU_DEBUG=0` leaves that out), and graphics libraries that are looked at and not taken.
+/// Parts of messages that are not about this crate: there is no layer, the layer is older than the number of
+/// WGSL among the languages in the debug information of SPIR-V (`WGPU_DEBUG=0` leaves that out), and wgpu
+/// tries graphics libraries that it then does not use.
 const FOREIGN: [&str; 4] = [
     "unable to find layer",
     "Invalid source language operand: 10",
@@ -48,9 +52,9 @@ impl log::Log for Logger {
 
 fn fitted(layout: &Layout, options: FitOptions) -> Model {
     let source = Source::built_in("cherry-235").unwrap();
-    let samples = SampleSet::measure(source.brdf().unwrap(), layout).unwrap();
-    let options = FitOptions { space: LatticeLayout::default().space(), ..options };
-    fit(&samples, &options, Provenance::default()).unwrap().0
+    let samples = source.measure(layout).unwrap();
+    let options = FitOptions { space: LatticeLayout::default().space().into(), ..options };
+    fit(&samples, &options).unwrap().model
 }
 
 /// One model of each kind of process.
@@ -59,12 +63,12 @@ fn models() -> Vec<Model> {
     let scattered = Layout::Random { count: 24, seed: 3 };
     let table = BrdfTable::from_fn(|a| [0.1 + a.theta_h.cos().powi(40); 3]);
     let size = InducingSize::Shape([5, 4, 3]);
-    let options = TableFitOptions { size, ..TableFitOptions::default() };
+    let options = CompressOptions { size, ..CompressOptions::default() };
     vec![
         fitted(&lattice, FitOptions::default()),
         fitted(&lattice, FitOptions { per_channel: true, ..FitOptions::default() }),
         fitted(&scattered, FitOptions { solver: Solver::Dense, ..FitOptions::default() }),
-        fit_table(&table, &options, Provenance::default()).unwrap().0,
+        compress(&table, &options, Provenance::default()).unwrap().model,
     ]
 }
 
@@ -83,7 +87,7 @@ fn bake_all(context: &Context, models: &[Model]) {
 }
 
 fn render_all(context: &Context, model: &Model) {
-    let (mean, sigma) = (bake_mean(model), bake_sigma(model));
+    let (mean, sigma) = (bake_mean(model), bake_sigma(model).unwrap());
     let prediction = BrdfTexture::upload(context, &mean, Some(&sigma), Precision::Half).unwrap();
     let truth = BrdfTexture::upload(context, &mean, None, Precision::Half).unwrap();
     let direction = [0.3, 0.2, 0.93, 0.0];
@@ -126,14 +130,13 @@ fn render_all(context: &Context, model: &Model) {
 fn a_run_of_everything_raises_no_warning() {
     log::set_logger(&Logger).unwrap();
     log::set_max_level(log::LevelFilter::Warn);
-    let context = match Context::open(AdapterChoice::Any) {
-        Ok(context) => context,
-        Err(error) if std::env::var("GPBRDF_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => return eprintln!("skipped: {error}"),
-    };
+    support::on_device("a_run_of_everything_raises_no_warning", run_everything);
+}
+
+fn run_everything(context: &Context) {
     let models = models();
-    bake_all(&context, &models);
-    render_all(&context, &models[0]);
+    bake_all(context, &models);
+    render_all(context, &models[0]);
     context.wait("test").unwrap();
     let all = std::mem::take(&mut *WARNINGS.lock().unwrap());
     let (known, raised): (Vec<String>, Vec<String>) =

@@ -1,20 +1,22 @@
-//! `gpbrdf-cli bake`: load, sample, bake, compare, write.
+//! `gpbrdf-cli bake`: measures a source, fits and bakes a model, compares it with the truth and writes it
+//! all.
 
-use std::path::PathBuf;
-use std::time::Instant;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::{
-    AtomicFile, BrdfTable, Environment, ExrChannels, ExrPart, Metrics, Model, N_CELLS, Picture, SliceOptions,
-    Source, render_env, slice_figure, sphere_figure, write_merl_to, write_table_exr_to,
-};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::figure::{Picture, SliceOptions, slice_figure, sphere_figure};
+use gpbrdf_core::formats::{ExrChannels, ExrPart, write_merl_to, write_table_exr_to};
+use gpbrdf_core::judge::render_env;
+use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
-use super::backend::{BackendArgs, Baked};
-use super::input::{OutputFolder, environment, open};
-use super::model_args::ModelArgs;
-use super::report::{Report, Seconds, cell_interval};
+use super::input::{environment, open};
 use super::terminal::Terminal;
+use crate::job::{Backend, Baked, Baking, Job, Judging, ModelSpec, Outcome, Report, Run, Stage, Truth};
+use crate::output::OutputFolder;
 
 /// Pixels along each side of the pictured spheres.
 const PICTURE_SIZE: usize = 160;
@@ -28,9 +30,10 @@ pub(crate) struct Bake {
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-out")]
     output: PathBuf,
     #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    backend: BackendArgs,
+    model: ModelSpec,
+    /// Where to bake.
+    #[arg(long, value_enum, default_value_t)]
+    backend: Backend,
     /// Environment map (.hdr or .exr, latitude-longitude) of the image metrics instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
@@ -50,103 +53,103 @@ pub(crate) struct Bake {
 
 impl Bake {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let start = Instant::now();
+        let mut run = Run::new(terminal.clone());
         OutputFolder::check(&self.output)?;
-        let mut seconds = Seconds::default();
-        let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
+        let source = run.stage(Stage::Load, || open(&self.input))?;
+        self.model.check(&source)?;
         let environment = environment(self.env.as_deref())?;
-        let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
-        let baked = self.backend.bake(&model, !self.no_sigma, &mut seconds, terminal)?;
-        let compare = !(self.no_metrics && self.no_images);
-        let truth = if compare {
-            seconds.measure("metrics", || terminal.stage("tabulating the truth", || source.table()))
-        } else {
-            None
-        };
-        let mut report = Report::new(&model, &fits, seconds, baked.backend.clone());
-        if let (false, Some(truth)) = (self.no_metrics, &truth) {
-            let begin = Instant::now();
-            report.metrics =
-                Some(terminal.stage("comparing", || compare_tables(truth, &baked, &model, &environment))?);
-            report.seconds.add("metrics", begin);
-        }
-        terminal.stage("writing", || {
-            self.write(&source, truth.as_deref(), &model, &baked, &environment, &mut report, start)
+        let is_compared = !(self.no_metrics && self.no_images);
+        let outcome = run.job(&Job {
+            baking: Some(Baking { backend: self.backend, sigma: !self.no_sigma }),
+            truth: if is_compared { Truth::Tabulated } else { Truth::Unwanted },
+            judging: if self.no_metrics { Judging::Nothing } else { Judging::All(&environment) },
+            ..Job::new(&source, &self.model)
         })?;
-        report.show(self.json, terminal)
-    }
-
-    /// Writes all outputs or none.
-    #[expect(clippy::too_many_arguments, reason = "the outputs need all of it")]
-    fn write(
-        &self,
-        source: &Source,
-        truth: Option<&BrdfTable>,
-        model: &Model,
-        baked: &Baked,
-        environment: &Environment,
-        report: &mut Report,
-        start: Instant,
-    ) -> Result<()> {
-        let begin = Instant::now();
-        let folder = OutputFolder::create(&self.output)?;
-        let mut files = Vec::new();
-        let mut create = |name: &str| create_in(&folder, name, &mut report.outputs);
-        let (mut binary, mut exr, mut safetensors) =
-            (create("table.binary")?, create("table.exr")?, create("model.safetensors")?);
-        // Disk and processor at once.
-        let (binary_written, exr_written) =
-            rayon::join(|| write_merl_to(&mut binary, &baked.mean), || write_exr(&mut exr, baked, truth));
-        binary_written.with_context(|| unwritten(&binary))?;
-        exr_written.with_context(|| unwritten(&exr))?;
-        std::io::Write::write_all(&mut safetensors, &model.to_bytes()?)
-            .with_context(|| unwritten(&safetensors))?;
-        files.extend([binary, exr, safetensors]);
-        if !self.no_images {
-            for (name, picture) in [
-                ("slice.png", slice_picture(source, truth, baked)?),
-                ("sphere.png", sphere_picture(source, truth, baked, environment, report)?),
-            ] {
-                let mut file = create_in(&folder, name, &mut report.outputs)?;
-                picture.write_png(&mut file).with_context(|| unwritten(&file))?;
-                files.push(file);
+        let mut outputs = run.stage(Stage::Write, || {
+            let mut outputs = Outputs::new(&self.output)?;
+            outputs.write_model(&outcome)?;
+            if !self.no_images {
+                outputs.write_pictures(&source, &outcome, &environment)?;
             }
-        }
-        let mut json = create_in(&folder, "report.json", &mut report.outputs)?;
-        report.seconds.add("write", begin);
-        report.seconds.add("total", start);
-        serde_json::to_writer_pretty(&mut json, report)?;
-        std::io::Write::write_all(&mut json, b"\n").with_context(|| unwritten(&json))?;
-        files.push(json);
-        AtomicFile::commit_all(files)?;
-        Ok(())
+            Ok(outputs)
+        })?;
+        let report = outputs.write_report(Report::new(&outcome, run.seconds()))?;
+        outputs.commit()?;
+        terminal.report(&report, self.json)
     }
 }
 
-fn create_in(folder: &OutputFolder, name: &str, outputs: &mut Vec<String>) -> Result<AtomicFile> {
-    let path = folder.join(name);
-    outputs.push(path.display().to_string());
-    Ok(AtomicFile::create(path)?)
+/// The files of a run, which appear together at its end.
+struct Outputs {
+    folder: OutputFolder,
+    files: Vec<AtomicFile>,
+}
+
+impl Outputs {
+    fn new(folder: &Path) -> Result<Self> {
+        Ok(Self { folder: OutputFolder::create(folder)?, files: Vec::new() })
+    }
+
+    /// Adds a file, which `write` fills.
+    fn add(&mut self, name: &str, write: impl FnOnce(&mut AtomicFile) -> Result<()>) -> Result<()> {
+        let mut file = AtomicFile::create(self.folder.join(name))?;
+        write(&mut file).with_context(|| unwritten(&file))?;
+        self.files.push(file);
+        Ok(())
+    }
+
+    /// Adds the model and its tables.
+    fn write_model(&mut self, outcome: &Outcome) -> Result<()> {
+        if let Some(baked) = &outcome.baked {
+            let mut binary = AtomicFile::create(self.folder.join("table.binary"))?;
+            let mut exr = AtomicFile::create(self.folder.join("table.exr"))?;
+            let truth = outcome.truth.as_deref();
+            // One file keeps the disk busy while the other one is compressed.
+            let (binary_written, exr_written) =
+                rayon::join(|| write_merl_to(&mut binary, &baked.mean), || write_exr(&mut exr, baked, truth));
+            binary_written.with_context(|| unwritten(&binary))?;
+            exr_written.with_context(|| unwritten(&exr))?;
+            self.files.extend([binary, exr]);
+        }
+        let model = outcome.fitted.model.to_bytes()?;
+        self.add("model.safetensors", |file| Ok(file.write_all(&model)?))
+    }
+
+    /// Adds a picture of one slice and one of spheres.
+    fn write_pictures(
+        &mut self,
+        source: &Source,
+        outcome: &Outcome,
+        environment: &Environment,
+    ) -> Result<()> {
+        let Some(baked) = &outcome.baked else { return Ok(()) };
+        let truth = outcome.truth.as_deref();
+        let psnr = outcome.metrics.as_ref().map(|metrics| metrics.images.psnr_env);
+        let slice = slice_picture(&source.name, truth, &baked.mean)?;
+        self.add("slice.png", |file| Ok(slice.write_png(file)?))?;
+        let sphere = sphere_picture(&source.name, truth, &baked.mean, environment, psnr)?;
+        self.add("sphere.png", |file| Ok(sphere.write_png(file)?))
+    }
+
+    /// Adds the report, which names all files, itself too.
+    fn write_report(&mut self, mut report: Report) -> Result<Report> {
+        let json = self.folder.join("report.json");
+        let paths = self.files.iter().map(AtomicFile::target).chain([json.as_path()]);
+        report.outputs = paths.map(|path| path.display().to_string()).collect();
+        self.add("report.json", |file| {
+            serde_json::to_writer_pretty(&mut *file, &report)?;
+            Ok(file.write_all(b"\n")?)
+        })?;
+        Ok(report)
+    }
+
+    fn commit(self) -> Result<()> {
+        Ok(AtomicFile::commit_all(self.files)?)
+    }
 }
 
 fn unwritten(file: &AtomicFile) -> String {
     format!("cannot write \"{}\"", file.target().display())
-}
-
-/// All metrics, with the coverage of the interval of an observation where sigma was baked.
-fn compare_tables(
-    truth: &BrdfTable,
-    baked: &Baked,
-    model: &Model,
-    environment: &Environment,
-) -> Result<Metrics> {
-    let noise = model.noise_variances();
-    let interval = baked
-        .sigma
-        .as_ref()
-        .map(|sigma| move |cell: usize| cell_interval(model, noise, &baked.mean, sigma, cell));
-    let interval = interval.as_ref().map(|f| f as &gpbrdf_core::Interval<'_>);
-    Ok(Metrics::new(truth, &baked.mean, environment, interval)?)
 }
 
 fn write_exr(file: &mut AtomicFile, baked: &Baked, truth: Option<&BrdfTable>) -> std::io::Result<()> {
@@ -158,16 +161,11 @@ fn write_exr(file: &mut AtomicFile, baked: &Baked, truth: Option<&BrdfTable>) ->
     };
     let mut parts =
         vec![rgb("mean", "predictive mean of the BRDF (median of the value)", baked.mean.values())];
-    let per_channel;
+    let per_channel = baked.sigma.as_deref().map(channels).unwrap_or_default();
     if let Some(sigma) = &baked.sigma {
         let channels = match sigma.planes() {
             [plane] => ExrChannels::Luminance(plane),
-            _ => {
-                per_channel = (0..N_CELLS)
-                    .map(|cell| std::array::from_fn(|c| sigma.value(cell, c)))
-                    .collect::<Vec<[f32; 3]>>();
-                ExrChannels::Rgb(&per_channel)
-            }
+            _ => ExrChannels::Rgb(&per_channel),
         };
         let description = "posterior standard deviation of the latent target";
         parts.push(ExrPart { name: "sigma", description, unit: "target units", channels });
@@ -183,20 +181,25 @@ fn write_exr(file: &mut AtomicFile, baked: &Baked, truth: Option<&BrdfTable>) ->
     write_table_exr_to(file, &parts)
 }
 
-fn slice_picture(source: &Source, truth: Option<&BrdfTable>, baked: &Baked) -> Result<Picture> {
-    let truth = truth.map(|t| t as &dyn gpbrdf_core::Brdf);
-    Ok(slice_figure(&source.name, truth, &baked.mean, None, &SliceOptions::default())?)
+/// Sigma of each channel in every cell, where the channels have a plane each; else nothing.
+fn channels(sigma: &SigmaTable) -> Vec<[f32; 3]> {
+    let cells = if sigma.planes().len() > 1 { N_CELLS } else { 0 };
+    (0..cells).map(|cell| std::array::from_fn(|c| sigma.value(cell, c))).collect()
+}
+
+fn slice_picture(name: &str, truth: Option<&BrdfTable>, mean: &BrdfTable) -> Result<Picture> {
+    let truth = truth.map(|truth| truth as &dyn Brdf);
+    Ok(slice_figure(name, truth, mean, &SliceOptions::default())?)
 }
 
 fn sphere_picture(
-    source: &Source,
+    name: &str,
     truth: Option<&BrdfTable>,
-    baked: &Baked,
+    mean: &BrdfTable,
     environment: &Environment,
-    report: &Report,
+    psnr: Option<f64>,
 ) -> Result<Picture> {
-    let psnr = report.metrics.as_ref().map(|m| m.images.psnr_env);
-    let tables: Vec<&BrdfTable> = std::iter::once(&baked.mean).chain(truth).collect();
+    let tables: Vec<&BrdfTable> = std::iter::once(mean).chain(truth).collect();
     let images = render_env(&tables, environment, PICTURE_SIZE);
-    Ok(sphere_figure(&source.name, images.get(1), &images[0], None, psnr)?)
+    Ok(sphere_figure(name, images.get(1), &images[0], psnr)?)
 }

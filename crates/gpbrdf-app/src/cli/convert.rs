@@ -1,13 +1,11 @@
-//! `gpbrdf-cli convert`: any source as `.binary`, `.exr` or `.csv`.
+//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr` or `.csv`.
 
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use gpbrdf_core::{
-    Content, ExrChannels, ExrPart, LatticeLayout, Layout, Sample, SampleSet, Samples, detect_symmetry,
-    write_merl, write_samples_csv, write_table_exr,
-};
+use gpbrdf_core::formats::{ExrChannels, ExrPart, write_merl, write_samples_csv, write_table_exr};
+use gpbrdf_core::{Content, LatticeLayout, Layout, detect_symmetry};
 
 use super::input::open;
 use super::terminal::Terminal;
@@ -18,7 +16,7 @@ pub(crate) struct Convert {
     input: PathBuf,
     /// File to write: .binary (MERL table), .exr (table) or .csv (samples).
     output: PathBuf,
-    /// Number of samples of a .csv from a source that can be asked anywhere.
+    /// Number of samples of a .csv from a source that can be evaluated at any direction.
     #[arg(long, value_name = "N", default_value_t = 3072)]
     samples: usize,
 }
@@ -29,12 +27,7 @@ impl Convert {
         let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         match extension.as_str() {
             "binary" | "exr" => {
-                let Some(table) = terminal.stage("tabulating", || source.table()) else {
-                    bail!(
-                        "{}: expected a BRDF that can be asked anywhere, found scattered samples; bake them instead",
-                        source.origin()
-                    );
-                };
+                let table = terminal.stage("Tabulating", || source.table())?;
                 if extension == "binary" {
                     write_merl(&self.output, &table)?;
                 } else {
@@ -48,20 +41,16 @@ impl Convert {
                 }
             }
             "csv" => {
-                let samples = match (&source.content, source.brdf()) {
-                    (Content::Samples(samples), _) => samples.clone(),
-                    (_, Some(brdf)) => {
-                        let layout = LatticeLayout::with_samples(self.samples, detect_symmetry(brdf))?;
-                        let set = SampleSet::measure(brdf, &Layout::Lattice(layout))?;
-                        let pairs = set.angles.iter().zip(&set.values).map(|(angles, &value)| {
-                            let (wi, wo) = angles.to_directions();
-                            Sample { wi, wo, value }
-                        });
-                        Samples { description: source.name.clone(), samples: pairs.collect() }
-                    }
-                    _ => bail!("{}: nothing to sample", source.origin()),
+                let measured;
+                let samples = if let Content::Samples(samples) = &source.content {
+                    samples
+                } else {
+                    let symmetry = detect_symmetry(source.brdf()?);
+                    let layout = Layout::Lattice(LatticeLayout::with_samples(self.samples, symmetry)?);
+                    measured = terminal.stage("Sampling", || source.measure(&layout))?;
+                    &measured
                 };
-                write_samples_csv(&self.output, &samples)?;
+                write_samples_csv(&self.output, samples)?;
             }
             _ => bail!("\"{}\": expected a name that ends in .binary, .exr or .csv", self.output.display()),
         }

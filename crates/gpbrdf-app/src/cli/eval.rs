@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::{BrdfTable, Content, IntervalOf, Metrics, Source, bake_mean, bake_sigma};
+use gpbrdf_core::base::number::significant;
+use gpbrdf_core::judge::SampleMetrics;
+use gpbrdf_core::{Content, IntervalOf, Metrics, Model, SampleSet, Source, bake_mean, bake_sigma};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
-use super::report::{cell_interval, metric_lines, significant};
 use super::terminal::Terminal;
+use crate::job::{judge, metric_lines};
 
 #[derive(Args, Debug)]
 pub(crate) struct Eval {
@@ -41,25 +43,14 @@ impl Eval {
         if let (Content::Model(model), Content::Samples(samples)) = (&prediction.content, &truth.content) {
             return self.against_samples(terminal, &prediction, &truth, model, samples);
         }
-        let table = |source: &Source| -> Result<BrdfTable> {
-            match source.table() {
-                Some(table) => Ok(table.into_owned()),
-                None => bail!(
-                    "{}: expected a table, a model or a BRDF that can be asked anywhere, found scattered samples",
-                    source.origin()
-                ),
-            }
-        };
-        let truth_table = terminal.stage("tabulating the truth", || table(&truth))?;
+        let truth_table = terminal.stage("Tabulating the truth", || truth.table())?;
         let metrics = if let Content::Model(model) = &prediction.content {
-            let (mean, sigma) = terminal.stage("baking", || (bake_mean(model), bake_sigma(model)));
-            let noise = model.noise_variances();
-            let interval = |cell: usize| cell_interval(model, noise, &mean, &sigma, cell);
-            terminal
-                .stage("comparing", || Metrics::new(&truth_table, &mean, &environment, Some(&interval)))?
+            let (mean, sigma) = terminal.stage("Baking", || (bake_mean(model), bake_sigma(model)));
+            let sigma = sigma?;
+            terminal.stage("Comparing", || judge(&truth_table, model, &mean, Some(&sigma), &environment))?
         } else {
-            let predicted = table(&prediction)?;
-            terminal.stage("comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
+            let predicted = terminal.stage("Tabulating", || prediction.table())?;
+            terminal.stage("Comparing", || Metrics::new(&truth_table, &predicted, &environment, None))?
         };
         if self.json {
             let metrics = serde_json::to_value(&metrics)?;
@@ -75,49 +66,30 @@ impl Eval {
         terminal: &Terminal,
         prediction: &Source,
         truth: &Source,
-        model: &gpbrdf_core::Model,
-        samples: &gpbrdf_core::Samples,
+        model: &Model,
+        samples: &SampleSet,
     ) -> Result<()> {
-        let angles: Vec<_> = samples.samples.iter().map(gpbrdf_core::Sample::half_diff).collect();
-        let predicted = terminal.stage("predicting", || model.predict(&angles, IntervalOf::Observation));
-        let (mut absolute, mut square, mut covered) = (0.0, 0.0, 0usize);
-        let mut logs = Vec::with_capacity(3 * samples.samples.len());
-        for (sample, p) in samples.samples.iter().zip(&predicted) {
-            for c in 0..3 {
-                let (f, g) = (sample.value[c], p.mean[c]);
-                absolute += (f - g).abs();
-                square += (f - g).powi(2);
-                covered += usize::from(p.lower[c] <= f && f <= p.upper[c]);
-                logs.push(((g + 1e-3).ln() - (f + 1e-3).ln()).abs());
-            }
-        }
-        logs.sort_unstable_by(f64::total_cmp);
-        let n = logs.len() as f64;
-        let rmse = (logs.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
-        let metrics = serde_json::json!({
-            "samples": samples.samples.len(),
-            "mae": absolute / n,
-            "mse": square / n,
-            "log_rmse": rmse,
-            "median_abs_log": logs[logs.len() / 2],
-            "coverage_95": covered as f64 / n,
-        });
+        let predicted =
+            terminal.stage("Predicting", || model.predict(&samples.angles, IntervalOf::Observation))?;
+        let metrics = SampleMetrics::new(&samples.values, &predicted)?;
         if self.json {
-            return self.print(terminal, prediction, truth, metrics);
+            return self.print(terminal, prediction, truth, serde_json::to_value(&metrics)?);
         }
         terminal.summary(&format!(
             "{} against {} samples of {}",
             prediction.origin(),
-            angles.len(),
+            metrics.samples,
             truth.origin()
         ))?;
         terminal.summary(&format!(
-            "  median |ln error| {:.4}, rms ln error {rmse:.4}, MAE {} /sr, MSE {} /sr^2\n  95 % interval covers {:.1} % of the samples",
-            logs[logs.len() / 2],
-            significant(absolute / n),
-            significant(square / n),
-            100.0 * covered as f64 / n
-        ))
+            "  median |ln error| {:.4}, rms ln error {:.4}, MAE {} /sr, MSE {} /sr^2",
+            metrics.median_abs_log,
+            metrics.log_rmse,
+            significant(metrics.mae, 4),
+            significant(metrics.mse, 4),
+        ))?;
+        terminal
+            .summary(&format!("  95 % interval covers {:.1} % of the samples", 100.0 * metrics.coverage_95))
     }
 
     fn print(&self, terminal: &Terminal, prediction: &Source, truth: &Source, metrics: Value) -> Result<()> {

@@ -1,17 +1,15 @@
-//! `gpbrdf-cli fit`: the model only.
+//! `gpbrdf-cli fit`: fits a model and writes nothing else.
 
 use std::io::Write;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 
 use super::input::open;
-use super::model_args::ModelArgs;
-use super::report::{Report, Seconds};
 use super::terminal::Terminal;
+use crate::job::{Job, ModelSpec, Report, Run, Stage};
 
 #[derive(Args, Debug)]
 pub(crate) struct Fit {
@@ -21,7 +19,7 @@ pub(crate) struct Fit {
     #[arg(short, long, value_name = "FILE", default_value = "model.safetensors")]
     output: PathBuf,
     #[command(flatten)]
-    model: ModelArgs,
+    model: ModelSpec,
     /// Print the report as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -29,20 +27,19 @@ pub(crate) struct Fit {
 
 impl Fit {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let start = Instant::now();
-        let mut seconds = Seconds::default();
-        let source = seconds.measure("load", || terminal.stage("reading", || open(&self.input)))?;
-        // Before the fit: a model that cannot be written is not worth the wait.
+        let mut run = Run::new(terminal.clone());
+        let source = run.stage(Stage::Load, || open(&self.input))?;
+        self.model.check(&source)?;
+        // Created before the fit, so that nobody waits for a model that cannot be written.
         let mut file = AtomicFile::create(&self.output)?;
-        let (model, fits) = self.model.sample_and_fit(&source, &mut seconds, terminal)?;
-        let mut report = Report::new(&model, &fits, seconds, "cpu".to_owned());
+        let outcome = run.job(&Job::new(&source, &self.model))?;
+        run.stage(Stage::Write, || {
+            file.write_all(&outcome.fitted.model.to_bytes()?)
+                .with_context(|| format!("cannot write \"{}\"", self.output.display()))?;
+            Ok(file.commit()?)
+        })?;
+        let mut report = Report::new(&outcome, run.seconds());
         report.outputs.push(self.output.display().to_string());
-        let begin = Instant::now();
-        file.write_all(&model.to_bytes()?)
-            .with_context(|| format!("cannot write \"{}\"", self.output.display()))?;
-        file.commit()?;
-        report.seconds.add("write", begin);
-        report.seconds.add("total", start);
-        report.show(self.json, terminal)
+        terminal.report(&report, self.json)
     }
 }

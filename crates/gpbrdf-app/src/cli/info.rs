@@ -1,14 +1,14 @@
-//! `gpbrdf-cli info`: what a file is.
+//! `gpbrdf-cli info`: describes a file or a built-in material.
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::{Content, merl_material_name};
+use gpbrdf_core::formats::merl_material_name;
+use gpbrdf_core::{Content, detect_symmetry};
 use serde_json::json;
 
 use super::input::open;
-use super::report::describe;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
@@ -28,21 +28,31 @@ impl Info {
                 let data = |v: &&[f32; 3]| v.iter().all(|&x| x >= 0.0);
                 let filled = table.values().iter().filter(data);
                 let largest = filled.clone().flatten().fold(0.0f32, |a, &b| a.max(b));
-                json!({ "cells": table.values().len(), "cells_with_data": filled.count(), "largest_value": largest,
-                    "merl_material": merl_material_name(&source.sha256) })
+                json!({
+                    "cells": table.values().len(),
+                    "cells_with_data": filled.count(),
+                    "largest_value": largest,
+                    "merl_material": merl_material_name(&source.sha256),
+                })
             }
             Content::Samples(samples) => {
-                let largest = samples.samples.iter().flat_map(|s| s.value).fold(0.0, f64::max);
-                json!({ "samples": samples.samples.len(), "largest_value": largest })
+                let largest = samples.values.as_flattened().iter().copied().fold(0.0, f64::max);
+                json!({ "samples": samples.len(), "largest_value": largest })
             }
-            Content::Function(brdf) => {
-                let symmetry = gpbrdf_core::detect_symmetry(brdf.as_ref());
+            Content::Function { brdf, .. } => {
+                let symmetry = detect_symmetry(brdf.as_ref());
                 json!({ "symmetry": symmetry })
             }
             Content::Model(model) => {
-                let (solver, kernel, hyperparameters) = describe(model);
-                json!({ "samples": model.samples(), "floats": model.floats(), "solver": solver, "kernel": kernel, "transform": model.transform,
-                    "provenance": model.provenance, "hyperparameters": hyperparameters })
+                json!({
+                    "samples": model.n_samples(),
+                    "floats": model.n_floats(),
+                    "solver": model.solver(),
+                    "kernel": model.kernel_name(),
+                    "transform": model.transform,
+                    "provenance": model.provenance,
+                    "hyperparameters": model.hyper_report(),
+                })
             }
         };
         if self.json {

@@ -1,18 +1,20 @@
-//! Inputs and outputs named on the command line.
+//! Inputs named on the command line.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::path::Path;
 
 use anyhow::{Result, bail};
-use gpbrdf_core::{Environment, Source, materials};
+use gpbrdf_core::brdf::materials;
+use gpbrdf_core::formats::read_environment;
+use gpbrdf_core::{Environment, Source};
 
-/// Opens `input`: a file if there is one of that name, else a built-in material.
+/// Opens the file of this name, or else the built-in material.
 pub(crate) fn open(input: &Path) -> Result<Source> {
     if let Ok(metadata) = input.metadata()
         && !metadata.is_file()
         && !metadata.is_dir()
     {
-        // Its kind is found before it is read: a pipe would be drained by then.
+        // A file is opened once to recognise its kind and once more to read it, which drains a pipe too
+        // early.
         bail!("\"{}\": expected a regular file, found a pipe or a device", input.display());
     }
     if input.exists() || input.is_symlink() {
@@ -30,94 +32,7 @@ pub(crate) fn open(input: &Path) -> Result<Source> {
 /// The environment of the image metrics: a file, or the built-in studio.
 pub(crate) fn environment(path: Option<&Path>) -> Result<Environment> {
     Ok(match path {
-        Some(path) => Environment::read(path)?,
+        Some(path) => read_environment(path)?,
         None => Environment::studio(),
     })
-}
-
-/// A folder for outputs, removed again if it was made here and stays empty.
-#[derive(Debug)]
-pub(crate) struct OutputFolder {
-    path: PathBuf,
-    created: Vec<PathBuf>,
-}
-
-/// Folders that were created and may still be empty.
-static CREATED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-
-fn created_folders() -> MutexGuard<'static, Vec<PathBuf>> {
-    CREATED.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Removes the folders that were created for outputs and hold none yet, for a handler of Ctrl-C. None can be created as long as
-/// the answer is held.
-pub(crate) fn remove_empty_folders() -> MutexGuard<'static, Vec<PathBuf>> {
-    let mut created = created_folders();
-    // Fails, as it should, for folders that hold something.
-    created.drain(..).for_each(|p| drop(std::fs::remove_dir(p)));
-    created
-}
-
-impl OutputFolder {
-    /// Refuses, before the work that leads up to it, a path that can be no folder.
-    pub(crate) fn check(path: &Path) -> Result<()> {
-        match path.ancestors().find(|p| p.exists()) {
-            Some(existing) if !existing.is_dir() => {
-                bail!(
-                    "cannot create folder \"{}\": expected a folder, found the file \"{}\"",
-                    path.display(),
-                    existing.display()
-                )
-            }
-            _ => Ok(()),
-        }
-    }
-
-    pub(crate) fn create(path: &Path) -> Result<Self> {
-        let mut all = created_folders();
-        let mut created: Vec<PathBuf> = path
-            .ancestors()
-            .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
-            .map(Path::to_owned)
-            .collect();
-        if let Err(source) = std::fs::create_dir_all(path) {
-            created.iter().for_each(|p| drop(std::fs::remove_dir(p)));
-            return Err(
-                anyhow::Error::new(source).context(format!("cannot create folder \"{}\"", path.display()))
-            );
-        }
-        created.retain(|p| p.exists());
-        all.extend(created.iter().cloned());
-        Ok(Self { path: path.to_owned(), created })
-    }
-
-    pub(crate) fn join(&self, name: &str) -> PathBuf {
-        self.path.join(name)
-    }
-}
-
-impl Drop for OutputFolder {
-    fn drop(&mut self) {
-        let mut all = created_folders();
-        all.retain(|p| !self.created.contains(p));
-        // Fails, as it should, for folders that hold something.
-        self.created.iter().for_each(|p| drop(std::fs::remove_dir(p)));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_interruption_removes_folders_that_hold_nothing() {
-        let base = tempfile::tempdir().unwrap();
-        let (empty, full) = (base.path().join("a/b"), base.path().join("c"));
-        let folders = [OutputFolder::create(&empty).unwrap(), OutputFolder::create(&full).unwrap()];
-        std::fs::write(folders[1].join("kept"), "x").unwrap();
-        drop(remove_empty_folders());
-        assert!(!base.path().join("a").exists() && full.join("kept").is_file());
-        drop(folders);
-        assert!(full.join("kept").is_file());
-    }
 }

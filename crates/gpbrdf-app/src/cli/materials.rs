@@ -1,8 +1,8 @@
-//! `gpbrdf-cli materials`: the built-in ones.
+//! `gpbrdf-cli materials`: lists the built-in materials.
 
 use anyhow::Result;
 use clap::Args;
-use gpbrdf_core::materials;
+use gpbrdf_core::brdf::materials;
 use serde_json::json;
 
 use super::terminal::Terminal;
@@ -19,7 +19,10 @@ impl Materials {
         if self.json {
             let all: Vec<_> = materials()
                 .iter()
-                .map(|m| json!({ "name": m.name, "title": m.title, "description": m.description, "source": m.source }))
+                .map(|m| {
+                    let (name, title) = (m.name, m.title);
+                    json!({ "name": name, "title": title, "description": m.description, "source": m.source })
+                })
                 .collect();
             return terminal.print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
         }

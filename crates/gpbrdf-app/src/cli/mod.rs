@@ -1,18 +1,15 @@
-//! Parse, run, print the chain of errors, and choose the exit code.
+//! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
-mod backend;
 mod bake;
 mod convert;
 mod eval;
 mod fit;
-mod inducing_args;
 mod info;
 mod input;
 mod materials;
-mod model_args;
+mod parse;
 mod predict;
 mod render;
-mod report;
 mod reproduce;
 mod shader;
 mod slice;
@@ -22,6 +19,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::job::Observer;
+use crate::output;
 use terminal::Terminal;
 
 /// Complete, render-ready BRDFs out of few measurements, with an error bar.
@@ -30,10 +29,10 @@ use terminal::Terminal;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Print nothing but errors and what was asked for.
+    /// Print only errors and the result itself.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Print more; twice for even more.
+    /// Print more about the run; given twice, its results as they come.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
     /// Worker threads; all processors by default. Results do not depend on it.
@@ -71,19 +70,19 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
+    let terminal = Terminal::new(arguments.quiet, arguments.verbose);
     // Ctrl-C: no partial file stays behind, nor an empty folder.
     let handler = ctrlc::set_handler(|| {
-        let _held = (gpbrdf_core::remove_pending(), input::remove_empty_folders());
+        let _held = (gpbrdf_core::base::remove_pending(), output::remove_empty_folders());
         std::process::exit(130);
     });
     if let Err(error) = handler {
-        eprintln!("warning: Ctrl-C may leave temporary files behind: {error}");
+        terminal.warn(&format!("Ctrl-C may leave temporary files behind: {error}"));
     }
     if let Some(threads) = arguments.threads {
-        // Fails only where a pool exists already, and none does yet.
+        // This fails only if a pool exists already, and none does yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
     }
-    let terminal = Terminal::new(arguments.quiet, arguments.verbose);
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
@@ -101,14 +100,14 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", one_line(&error));
+            terminal.error(&one_line(&error));
             ExitCode::FAILURE
         }
     }
 }
 
-/// The chain of causes from the outside in, joined by colons. A cause that the message before it already ends with is
-/// left out.
+/// The causes of an error from the outside in, joined by colons. A cause is left out where the message before
+/// it already ends with it.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain().map(ToString::to_string) {

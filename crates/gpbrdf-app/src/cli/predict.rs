@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use gpbrdf_core::{AtomicFile, IntervalOf, Model, read_directions_csv};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::formats::read_directions_csv;
+use gpbrdf_core::{IntervalOf, Model};
 
 use super::terminal::Terminal;
 
@@ -13,13 +15,13 @@ use super::terminal::Terminal;
 pub(crate) struct Predict {
     /// Model file.
     model: PathBuf,
-    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the header says
-    /// otherwise.
+    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the
+    /// header says otherwise.
     directions: PathBuf,
     /// CSV file to write instead of standard output.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Intervals of the noise-free value instead of a new measurement's.
+    /// Give intervals of the noise-free value instead of those of a new measurement.
     #[arg(long)]
     latent: bool,
 }
@@ -29,7 +31,7 @@ impl Predict {
         let model = Model::load(&self.model)?;
         let directions = read_directions_csv(&self.directions)?;
         let of = if self.latent { IntervalOf::Latent } else { IntervalOf::Observation };
-        let predictions = terminal.stage("predicting", || model.predict(&directions.angles, of));
+        let predictions = terminal.stage("Predicting", || model.predict(&directions.angles, of))?;
         let mut text = directions.columns.join(",");
         for part in ["", "_lower", "_upper"] {
             for channel in ["r", "g", "b"] {

@@ -1,11 +1,11 @@
 //! `gpbrdf-cli shader`: the lookup of a baked texture for other renderers.
 
-use std::io::{IsTerminal as _, Write as _};
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use gpbrdf_core::AtomicFile;
+use gpbrdf_core::base::AtomicFile;
 use gpbrdf_render::{ShaderLanguage, translate};
 
 use super::terminal::Terminal;
@@ -46,14 +46,10 @@ impl Shader {
         let binary = language == ShaderLanguage::Spirv;
         let code = translate(language)?;
         let Some(path) = &self.output else {
-            let mut out = std::io::stdout().lock();
-            if binary && out.is_terminal() {
+            if binary && terminal.is_terminal() {
                 bail!("SPIR-V is binary: expected --output FILE, found a terminal");
             }
-            return out
-                .write_all(&code)
-                .and_then(|()| out.flush())
-                .context("cannot write to standard output");
+            return terminal.print_bytes(&code);
         };
         let mut file = AtomicFile::create(path)?;
         file.write_all(&code).with_context(|| format!("cannot write \"{}\"", path.display()))?;

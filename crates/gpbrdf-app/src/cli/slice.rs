@@ -1,10 +1,13 @@
-//! `gpbrdf-cli slice`: a picture at one `phi_d`.
+//! `gpbrdf-cli slice`: draws a BRDF at one `phi_d`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use clap::Args;
-use gpbrdf_core::{AtomicFile, BrdfTable, Slice, SliceOptions, Source, slice_figure};
+use clap::{Args, value_parser};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::figure::{Slice, SliceOptions, slice_figure};
+use gpbrdf_core::formats::write_image_exr;
+use gpbrdf_core::{Brdf, BrdfTable};
 
 use super::input::open;
 use super::terminal::Terminal;
@@ -22,14 +25,14 @@ pub(crate) struct SliceCommand {
     /// Exposure in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_hyphen_values = true)]
     exposure: f64,
-    /// Show theta_h by its square root, as the table stores it.
+    /// Space theta_h by its square root, as the table does.
     #[arg(long)]
     square_theta_h: bool,
-    /// Show beside a truth, with their difference.
+    /// Show a truth beside it, and their difference.
     #[arg(long, value_name = "TRUTH")]
     difference: Option<PathBuf>,
     /// Rows and columns of a slice.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u32).range(8..=4096))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = value_parser!(u32).range(8..=4096))]
     size: u32,
 }
 
@@ -53,28 +56,19 @@ impl SliceCommand {
             ..SliceOptions::default()
         };
         let source = open(&self.input)?;
-        let prediction = table(&source)?;
-        let truth = self.difference.as_deref().map(|t| table(&open(t)?)).transpose()?;
+        let prediction = source.table()?.into_owned();
+        let truth =
+            self.difference.as_deref().map(|t| anyhow::Ok(open(t)?.table()?.into_owned())).transpose()?;
         if raw {
             write_exr(&self.output, &prediction, truth.as_ref(), &options)?;
         } else {
-            let truth = truth.as_ref().map(|t| t as &dyn gpbrdf_core::Brdf);
-            let picture = slice_figure(&source.name, truth, &prediction, None, &options)?;
+            let truth = truth.as_ref().map(|t| t as &dyn Brdf);
+            let picture = slice_figure(&source.name, truth, &prediction, &options)?;
             let mut file = AtomicFile::create(&self.output)?;
             picture.write_png(&mut file)?;
             file.commit()?;
         }
         terminal.summary(&format!("wrote {}", self.output.display()))
-    }
-}
-
-fn table(source: &Source) -> Result<BrdfTable> {
-    match source.table() {
-        Some(table) => Ok(table.into_owned()),
-        None => bail!(
-            "{}: expected a BRDF that can be asked anywhere, found scattered samples; fit them first",
-            source.origin()
-        ),
     }
 }
 
@@ -92,7 +86,7 @@ fn write_exr(
         }
     }
     let mut file = AtomicFile::create(path)?;
-    gpbrdf_core::write_image_exr(&mut file, options.size, options.size, &values)?;
+    write_image_exr(&mut file, options.size, options.size, &values)?;
     file.commit()?;
     Ok(())
 }

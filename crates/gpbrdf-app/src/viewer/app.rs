@@ -1,53 +1,54 @@
-//! The program: what is open, what is selected, and what the threads have sent.
+//! The program: it joins panes, threads and what is open. Only this file knows all messages of the program.
+
+mod opening;
 
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use eframe::egui::{self, Context, TextureHandle, Ui};
-use gpbrdf_core::Environment;
+use eframe::egui::{self, CentralPanel, Context, Frame, Panel, Ui};
+use gpbrdf_core::Source;
 
-use super::curves::{Albedo, AlbedoRequest};
-use super::dialogs::Purpose;
-use super::document::{Document, DocumentId, Work};
-use super::fitter::{Event, Fitter, Outbox};
-use super::mailbox::Sender;
-use super::messages::Messages;
-use super::plots_panel::PlotCache;
-use super::quality::Quality;
-use super::scene::{SceneKey, SceneRequest};
-use super::settings::Settings;
-use super::shortcuts;
-use super::slices::{SliceKey, SliceRequest};
-use super::spheres::{SphereKey, SphereRequest};
-use super::{curves, scene, slices, spheres};
+use super::state::document::{Document, DocumentId, Work};
+use super::state::session::SavedDocument;
+use super::state::settings::Settings;
+use super::ui::layout::{self, Panes};
+use super::ui::menu::Menu;
+use super::ui::messages::messages_ui;
+use super::ui::pane::{Command, Offers, Order, Pane, PaneContext, Progress, Start};
+use super::ui::panes;
+use super::ui::shortcuts::{self, Action};
+use super::ui::status::status_ui;
+use super::ui::windows::{Reply, Windows};
+use super::work::dialogs::{self, Access, Question};
+use super::work::export::{self, Saved};
+use super::work::fitter::{self, Fitter, News, Report};
+use super::work::outbox::{Outbox, Waker};
 
-/// Slices as textures.
-pub(crate) struct ShownSlices {
-    pub(crate) key: SliceKey,
-    pub(crate) textures: [Option<TextureHandle>; 4],
-    pub(crate) limits: [Option<f64>; 4],
+/// A source that has been read, with what a session says about it.
+#[derive(Debug)]
+struct Opened {
+    source: Box<Source>,
+    restore: Option<Box<SavedDocument>>,
 }
 
-/// Spheres as textures.
-pub(crate) struct ShownSpheres {
-    pub(crate) images: Box<spheres::SphereImages>,
-    pub(crate) truth: Option<TextureHandle>,
-    pub(crate) mean: TextureHandle,
-    pub(crate) difference: Option<TextureHandle>,
-    pub(crate) sigma: Option<TextureHandle>,
-}
-
-/// An object as textures.
-pub(crate) struct ShownScene {
-    pub(crate) document: DocumentId,
-    pub(crate) picture: u64,
-    pub(crate) texture: TextureHandle,
-    /// The prediction, where `texture` is the truth alone.
-    pub(crate) beside: Option<TextureHandle>,
-    pub(crate) samples: u32,
+/// What the program is told; panes are told the rest.
+#[derive(Debug)]
+enum Event {
+    /// The fitter has news.
+    Fit(Report),
+    /// A file has been read, or not.
+    Opened(Result<Opened, String>),
+    /// A file has been written, or not.
+    Saved(Saved),
+    /// Paths have been chosen in the dialog of the system.
+    Browsed((Question, Vec<PathBuf>)),
+    /// Open this file.
+    Open(PathBuf),
+    /// Write the session to this file.
+    SaveSession(PathBuf),
 }
 
 /// How long the window's own work takes.
@@ -61,65 +62,34 @@ pub struct FrameTimes {
     pub frames: usize,
 }
 
-/// Which small window is open.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Windows {
-    pub(crate) open: bool,
-    pub(crate) help: bool,
-    /// The window that asks for a path to write to.
-    pub(crate) save: Option<Purpose>,
-    pub(crate) path: String,
-}
-
 /// The program without its window: everything but the event loop.
 pub struct Viewer {
-    pub(crate) settings: Settings,
-    pub(crate) documents: Vec<Document>,
-    pub(crate) selected: Option<DocumentId>,
-    pub(crate) messages: Messages,
-    pub(crate) windows: Windows,
-    pub(crate) outbox: Outbox,
-    pub(crate) events: Receiver<Event>,
-    pub(crate) fitter: Fitter,
-    pub(crate) slicer: Sender<SliceRequest>,
-    pub(crate) integrator: Sender<Vec<AlbedoRequest>>,
-    pub(crate) renderer: Sender<SphereRequest>,
-    pub(crate) scenery: Option<Sender<SceneRequest>>,
-    pub(crate) staged: Option<SceneKey>,
-    pub(crate) scene: Option<ShownScene>,
-    pub(crate) quality: Option<Quality>,
-    /// Why the window's device is gone, once it is.
-    pub(crate) lost: Arc<OnceLock<String>>,
-    /// Where screenshots go; the current folder unless it is set.
-    pub(crate) pictures: Option<PathBuf>,
-    /// Pixels of the view of objects.
-    pub(crate) scene_size: [u32; 2],
-    pub(crate) sliced: Option<SliceKey>,
-    pub(crate) rendered: Option<SphereKey>,
-    pub(crate) integrated: Vec<(DocumentId, u64, bool)>,
-    pub(crate) slices: Option<ShownSlices>,
-    pub(crate) spheres: Option<ShownSpheres>,
-    pub(crate) albedos: Vec<Albedo>,
-    pub(crate) plots: PlotCache,
-    pub(crate) environment: (u64, String, Arc<Environment>),
-    /// Views go back to what they show at first: in this frame, in the next one.
-    pub(crate) reset_views: bool,
-    pub(crate) reset_next: bool,
-    /// What a session says about the scale, until it is taken over.
-    pub(crate) new_zoom: Option<f32>,
-    pub(crate) solo: Option<DocumentId>,
-    pub(crate) next_id: u64,
+    settings: Settings,
+    context: PaneContext,
+    panes: Vec<Box<dyn Pane>>,
+    windows: Windows,
+    fitter: Fitter,
+    outbox: Outbox<Event>,
+    events: Receiver<Event>,
+    wake: Waker,
+    /// Why the device of the window is gone, once it is.
+    lost: Arc<OnceLock<String>>,
+    /// The folder of screenshots; `None` for the current one.
+    pictures: Option<PathBuf>,
+    /// The scale that a session asks for, until it is taken over.
+    new_zoom: Option<f32>,
     applied_theme: Option<Option<bool>>,
     frames: FrameTimes,
 }
 
 impl std::fmt::Debug for Viewer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Viewer").field("documents", &self.documents.len()).finish_non_exhaustive()
+        let open = self.context.documents.iter().count();
+        f.debug_struct("Viewer").field("documents", &open).finish_non_exhaustive()
     }
 }
 
-/// The material of the first second.
+/// The material that is open at first.
 const FIRST: &str = "cherry-235";
 
 impl Viewer {
@@ -129,9 +99,6 @@ impl Viewer {
     /// The system gives no threads.
     pub fn new(ctx: &Context, settings: Settings, files: &[PathBuf]) -> Result<Self> {
         let mut viewer = Self::empty(ctx, settings)?;
-        if let Some(path) = viewer.settings.environment.clone() {
-            viewer.open_environment(&path);
-        }
         if files.is_empty() {
             viewer.open_built_in(FIRST, None);
         }
@@ -145,69 +112,58 @@ impl Viewer {
     /// The system gives no threads.
     pub fn reopened(ctx: &Context, mut old: Self) -> Result<Self> {
         old.receive(ctx);
-        let mut viewer = Self::empty(ctx, std::mem::take(&mut old.settings))?;
-        viewer.documents = std::mem::take(&mut old.documents);
-        for document in viewer.documents.iter_mut().filter(|d| d.is_busy()) {
-            // What the old threads have not finished is asked anew.
-            (document.asked, document.work) = (None, Work::Waiting);
+        let mut viewer = Self::empty(ctx, old.settings())?;
+        viewer.context.documents = std::mem::take(&mut old.context.documents);
+        for document in viewer.context.documents.iter_mut().filter(|d| d.is_busy()) {
+            // What the old threads have not finished is requested again.
+            (document.requested, document.work) = (None, Work::Waiting);
         }
-        viewer.messages = std::mem::take(&mut old.messages);
+        viewer.context.messages = std::mem::take(&mut old.context.messages);
         if let Some(message) = old.lost.get() {
-            viewer.messages.error(format!("{message}; this is a new window"));
+            viewer.context.messages.error(format!("{message}; this is a new window"));
         }
-        viewer.environment = (old.environment.0, old.environment.1.clone(), Arc::clone(&old.environment.2));
         viewer.pictures = old.pictures.take();
-        (viewer.selected, viewer.solo, viewer.next_id) = (old.selected, old.solo, old.next_id);
         Ok(viewer)
     }
 
     fn empty(ctx: &Context, settings: Settings) -> Result<Self> {
-        let (sender, events) = channel();
-        let waker = ctx.clone();
-        let outbox = Outbox { events: sender, wake: Arc::new(move || waker.request_repaint()) };
-        let fitter = Fitter::new(outbox.clone())?;
-        let busy = fitter.busy();
+        let repaint = ctx.clone();
+        let wake: Waker = Arc::new(move || repaint.request_repaint());
+        let (outbox, events) = Outbox::channel(&wake);
+        let fitter = Fitter::new(outbox.map(Event::Fit))?;
+        let start = Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()) };
+        let open = Question {
+            title: "Open materials",
+            help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model or session:",
+            access: Access::ReadMany {
+                kind: "Materials",
+                endings: &["binary", "bsdf", "csv", "exr", "safetensors", "brdf", "json"],
+            },
+            answer: outbox.map(Event::Open),
+        };
         ctx.set_zoom_factor(settings.zoom.clamp(0.5, 3.0));
-        Ok(Self {
+        let mut viewer = Self {
             settings,
-            documents: Vec::new(),
-            selected: None,
-            messages: Messages::default(),
-            windows: Windows::default(),
-            slicer: slices::spawn(outbox.clone())?,
-            integrator: curves::spawn(outbox.clone())?,
-            renderer: spheres::spawn(outbox.clone(), busy)?,
-            scenery: Some(scene::spawn(outbox.clone(), None, fitter.busy())?),
+            context: PaneContext::new(outbox.map(Event::Saved)),
+            panes: panes::all(&start)?,
+            windows: Windows::new(open),
             fitter,
             outbox,
             events,
-            staged: None,
-            scene: None,
-            quality: None,
+            wake,
             lost: Arc::default(),
             pictures: None,
-            scene_size: [0; 2],
-            sliced: None,
-            rendered: None,
-            integrated: Vec::new(),
-            slices: None,
-            spheres: None,
-            albedos: Vec::new(),
-            plots: PlotCache::default(),
-            environment: (0, "Studio (built in)".to_owned(), Arc::new(Environment::studio())),
-            reset_views: false,
-            reset_next: false,
             new_zoom: None,
-            solo: None,
-            next_id: 0,
             applied_theme: None,
             frames: FrameTimes::default(),
-        })
+        };
+        viewer.restore_panes();
+        Ok(viewer)
     }
 
     /// Listens for the loss of the window's device.
     pub fn watch_device(&self, state: &eframe::egui_wgpu::RenderState) {
-        let (wake, adapter) = (Arc::clone(&self.outbox.wake), state.adapter.get_info().name);
+        let (wake, adapter) = (Arc::clone(&self.wake), state.adapter.get_info().name);
         let lost = Arc::clone(&self.lost);
         state.device.set_device_lost_callback(move |reason, message| {
             let reason = format!("{reason:?} {message}");
@@ -218,38 +174,47 @@ impl Viewer {
         });
     }
 
-    /// Lights objects on this device in place of one of its own.
+    /// Lets panes compute on this device in place of one that they open.
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn use_device(&mut self, context: gpbrdf_render::Context) -> Result<()> {
-        self.scenery = Some(scene::spawn(self.outbox.clone(), Some(context), self.fitter.busy())?);
-        self.staged = None;
+    pub fn use_device(&mut self, device: &gpbrdf_render::Context) -> Result<()> {
+        for pane in &mut self.panes {
+            pane.use_device(device)?;
+        }
         Ok(())
     }
 
-    /// Takes leave of the graphics driver, which must not be unloaded under a thread.
+    /// Ends the threads that use the graphics driver, which must not be unloaded while they run.
     pub fn close(&mut self) {
-        if let Some(scenery) = self.scenery.take() {
-            scenery.join();
+        for pane in &mut self.panes {
+            pane.close();
         }
     }
 
-    /// Whether the window's device is gone, so that the window shows nothing any more: time for [`Self::reopened`].
+    /// Whether the window's device is gone, so that the window shows nothing any more: time for
+    /// [`Self::reopened`].
     #[must_use]
     pub fn has_lost_device(&self) -> bool {
         self.lost.get().is_some()
     }
 
-    /// Sets where screenshots go: the current folder unless this is called.
+    /// Why the window's device is gone, once it is.
+    pub(super) fn loss(&self) -> Option<String> {
+        self.lost.get().cloned()
+    }
+
+    /// Sets the folder of screenshots, which is the current one unless this is called.
     pub fn set_picture_folder(&mut self, folder: PathBuf) {
         self.pictures = Some(folder);
     }
 
     /// What is remembered from run to run.
     #[must_use]
-    pub fn settings(&self) -> &Settings {
-        &self.settings
+    pub fn settings(&self) -> Settings {
+        let kept = self.panes.iter().map(|pane| (pane.name().to_owned(), pane.settings()));
+        let panes = kept.filter(|(_, kept)| !kept.is_null()).collect();
+        Settings { panes, ..self.settings.clone() }
     }
 
     /// How long the window's own work takes.
@@ -266,36 +231,24 @@ impl Viewer {
     /// Whether nothing is being read, fitted or drawn.
     #[must_use]
     pub fn is_settled(&self) -> bool {
-        let drawn = self.spheres.as_ref().map(|s| (s.images.key, s.images.fine));
-        let drawn = drawn == self.rendered.map(|key| (key, true));
-        self.is_fitted() && drawn
+        self.has_come_to(Progress::Done)
     }
 
-    /// Whether nothing is being read or fitted, and the slices show it; spheres may still be refined.
+    /// Whether nothing is being read or fitted, and the views show it; pictures may still be refined.
     #[must_use]
     pub fn is_fitted(&self) -> bool {
-        let fitted = |d: &Document| match &d.work {
-            Work::Failed(_) | Work::Cancelled => true,
-            Work::Idle => d.fitted.is_some() && d.asked.as_ref() == Some(&d.spec),
-            _ => false,
-        };
-        self.documents.iter().all(fitted) && self.slices.as_ref().map(|s| s.key) == self.sliced
+        self.has_come_to(Progress::Refining)
+    }
+
+    fn has_come_to(&self, progress: Progress) -> bool {
+        let fitted = self.context.documents.iter().all(Document::is_fitted);
+        fitted && self.panes.iter().all(|pane| pane.progress() >= progress)
     }
 
     /// A number that changes with every result that is shown.
     #[must_use]
     pub fn shown_version(&self) -> u64 {
-        self.slices.as_ref().map_or(0, |s| s.key.version)
-    }
-
-    /// The selected material.
-    pub(crate) fn document(&self) -> Option<&Document> {
-        self.documents.iter().find(|d| Some(d.id) == self.selected)
-    }
-
-    /// The materials that are drawn in the plots.
-    pub(crate) fn visible(&self) -> impl Iterator<Item = &Document> {
-        self.documents.iter().filter(|d| self.solo.map_or(d.visible, |solo| solo == d.id))
+        self.panes.iter().filter_map(|pane| pane.shown_version()).min().unwrap_or(0)
     }
 
     /// One frame.
@@ -309,23 +262,182 @@ impl Viewer {
             let dropped = ctx.input(|i| super::dropped_paths(&i.raw));
             self.open_paths(&dropped);
         }
-        for action in shortcuts::pressed(&ctx) {
+        let commands = self.commands();
+        for action in shortcuts::pressed(&ctx, &commands) {
             self.act(&ctx, action);
         }
-        self.window_ui(ui);
+        self.window_ui(ui, &commands);
+        self.do_orders();
         self.request();
-        self.reset_views = std::mem::take(&mut self.reset_next);
+        self.context.reset_views = std::mem::take(&mut self.context.reset_next);
         match self.new_zoom.take() {
             Some(zoom) => ctx.set_zoom_factor(zoom.clamp(0.5, 3.0)),
             None => self.settings.zoom = ctx.zoom_factor(),
         }
-        if self.documents.iter().any(Document::is_busy) {
+        if self.context.documents.iter().any(Document::is_busy) {
             // The seconds count on.
             ctx.request_repaint_after(Duration::from_millis(100));
         }
         self.frames.last = start.elapsed();
         self.frames.longest = self.frames.longest.max(self.frames.last);
         self.frames.frames += 1;
+    }
+
+    /// Takes in what the threads have sent.
+    fn receive(&mut self, ctx: &Context) {
+        while let Ok(event) = self.events.try_recv() {
+            match event {
+                Event::Fit(report) => self.take(report),
+                Event::Opened(Ok(opened)) => self.open(opened),
+                Event::Saved(Ok(note)) => self.context.messages.note(note),
+                Event::Opened(Err(message)) | Event::Saved(Err(message)) => {
+                    self.context.messages.error(message);
+                }
+                Event::Browsed((question, paths)) => self.answer(&question, paths),
+                Event::Open(path) => self.open_paths(&[path]),
+                Event::SaveSession(path) => self.save_session(&path),
+            }
+        }
+        for pane in &mut self.panes {
+            pane.receive(ctx, &mut self.context);
+        }
+    }
+
+    /// Takes in what the fitter reports about a document, unless it has been closed.
+    fn take(&mut self, report: Report) {
+        let Some(document) = self.context.documents.get_mut(report.document) else { return };
+        if let News::Failed(message) = &report.news {
+            self.context.messages.error(format!("{}: {message}", document.name));
+        }
+        report.news.apply(document);
+    }
+
+    /// Passes chosen paths on to whoever has asked for them.
+    fn answer(&mut self, question: &Question, paths: Vec<PathBuf>) {
+        self.windows.answered(question);
+        for path in paths {
+            question.answer.send(path);
+        }
+    }
+
+    /// Everything that keys and the menu do.
+    fn commands(&mut self) -> Vec<(Action, Command)> {
+        let mut all = shortcuts::of_program(&layout::views(&self.panes));
+        for (i, pane) in self.panes.iter_mut().enumerate() {
+            let mut offers = Offers::default();
+            pane.commands(&mut offers, &mut self.context);
+            let offered = offers.into_list().into_iter().enumerate();
+            all.extend(offered.map(|(j, command)| (Action::Pane(i, j), command)));
+        }
+        all
+    }
+
+    fn act(&mut self, ctx: &Context, action: Action) {
+        match action {
+            Action::OpenWindow => self.windows.ask_open(),
+            Action::SaveSession => self.windows.ask(Question {
+                title: "Save session",
+                help: "The open materials and how they are shown, as JSON.",
+                access: Access::Write { name: "session.json" },
+                answer: self.outbox.map(Event::SaveSession),
+            }),
+            Action::Screenshot => export::screenshot(ctx, self.pictures.clone(), &self.context.saved),
+            Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
+            Action::TogglePanels => self.settings.panels ^= true,
+            Action::Help => self.windows.toggle_help(),
+            Action::Cancel => {
+                let selected = self.context.documents.selected_id();
+                if let Some(id) = selected.filter(|_| !self.windows.close_all()) {
+                    self.cancel(id);
+                }
+            }
+            Action::ResetViews => self.context.reset_next = true,
+            Action::Open(path) => self.open_paths(&[path]),
+            Action::OpenBuiltIn(name) => self.open_built_in(name, None),
+            Action::Overview => self.settings.view = None,
+            Action::View(name) => self.settings.view = Some(name.to_owned()),
+            Action::Pane(pane, command) => {
+                self.panes[pane].commands(&mut Offers::running(command), &mut self.context);
+            }
+        }
+    }
+
+    /// Does what the panes have ordered.
+    fn do_orders(&mut self) {
+        for order in std::mem::take(&mut self.context.orders) {
+            match order {
+                Order::OpenWindow => self.windows.ask_open(),
+                Order::Remove(id) => self.remove(id),
+                Order::Cancel(id) => self.cancel(id),
+                Order::Ask(question) => self.windows.ask(question),
+            }
+        }
+    }
+
+    /// Cancels the requests of a material.
+    fn cancel(&mut self, id: DocumentId) {
+        if let Some(document) = self.context.documents.get_mut(id).filter(|d| d.is_busy()) {
+            self.fitter.cancel(id);
+            document.work = Work::Cancelled;
+        }
+    }
+
+    /// Closes a material.
+    fn remove(&mut self, id: DocumentId) {
+        self.fitter.forget(id);
+        self.context.documents.remove(id);
+    }
+
+    /// Requests models and pictures for what has changed.
+    fn request(&mut self) {
+        for document in self.context.documents.iter_mut() {
+            if document.requested.as_ref() == Some(&document.spec) {
+                continue;
+            }
+            document.requested = Some(document.spec.clone());
+            if !document.is_busy() {
+                document.work = Work::Waiting;
+            }
+            self.fitter.submit(fitter::Request {
+                document: document.id,
+                source: Arc::clone(&document.source),
+                truth: document.truth.clone(),
+                spec: document.spec.clone(),
+            });
+        }
+        for pane in &mut self.panes {
+            pane.request(&mut self.context);
+        }
+    }
+
+    /// The whole window.
+    fn window_ui(&mut self, ui: &mut Ui, commands: &[(Action, Command)]) {
+        let ctx = ui.ctx().clone();
+        if self.settings.panels {
+            let views = layout::views(&self.panes);
+            let mut menu = Menu { settings: &mut self.settings, commands, views: &views };
+            let chosen = Panel::top("menu").show(ui, |ui| menu.ui(ui)).inner;
+            if let Some(action) = chosen {
+                self.act(&ctx, action);
+            }
+        }
+        messages_ui(ui, &mut self.context.messages);
+        if self.settings.panels {
+            let last = self.frames.last;
+            Panel::bottom("status").show(ui, |ui| status_ui(ui, &self.context.documents, last));
+        }
+        let mut panes = Panes { list: &mut self.panes, cx: &mut self.context, settings: &mut self.settings };
+        if panes.settings.panels {
+            panes.side_ui(ui);
+        }
+        let frame = Frame::central_panel(ui.style()).inner_margin(10);
+        CentralPanel::default().frame(frame).show(ui, |ui| panes.views_ui(ui));
+        match self.windows.ui(&ctx, commands) {
+            Some(Reply::Path(question, path)) => self.answer(&question, vec![path]),
+            Some(Reply::BuiltIn(name)) => self.open_built_in(name, None),
+            Some(Reply::Browse(question)) => dialogs::browse(question, &self.outbox.map(Event::Browsed)),
+            None => {}
+        }
     }
 
     fn apply_theme(&mut self, ctx: &Context) {

@@ -1,40 +1,15 @@
 //! The desktop program: see a material, its prediction and the error, and change the model live.
 //!
-//! [`Viewer`] is the program without a window, so that tests can drive it; [`main`] puts it into one. All work that
-//! takes longer than a frame runs on threads: `fitter` samples, fits and bakes, `slices`, `curves` and `spheres` make
-//! pictures. Each takes the newest request and gives up older ones; results come back as events.
+//! [`Viewer`] is the program without a window, so that tests can drive it; [`main`] puts it into one.
+//! `state/` is what is open, `work/` is what threads do, and `ui/` draws. All work that takes longer than a
+//! frame runs on threads: one samples, fits and bakes, others make pictures. Each serves the newest request
+//! and drops older ones. The window is made of panes (`ui/pane.rs`), each of which keeps its own state and
+//! its own worker.
 
-mod actions;
 mod app;
-mod curves;
-mod dialogs;
-mod document;
-mod export;
-mod fitter;
-mod inbox;
-mod layout;
-mod mailbox;
-mod materials_panel;
-mod menu;
-mod messages;
-mod model_panel;
-mod object_panel;
-mod opening;
-mod plots_panel;
-mod quality;
-mod requests;
-mod scene;
-mod session;
-mod settings;
-mod shortcuts;
-mod slices;
-mod slices_panel;
-mod spec;
-mod sphere_panel;
-mod spheres;
-mod status;
-mod widgets;
-mod windows;
+mod state;
+mod ui;
+mod work;
 
 use std::cell::RefCell;
 use std::path::PathBuf;
@@ -46,7 +21,7 @@ use clap::Parser;
 use eframe::egui;
 
 pub use app::{FrameTimes, Viewer};
-pub use settings::Settings;
+pub use state::settings::Settings;
 
 /// See a measured material, its Gaussian-process prediction and the error, and change the model live.
 #[derive(Debug, Parser)]
@@ -59,7 +34,7 @@ struct Arguments {
 /// The viewer in a window of eframe.
 struct Window {
     viewer: Option<Viewer>,
-    /// Where the viewer goes when its window closes for a new one.
+    /// Where the viewer is put when its window closes for a new one.
     kept: Rc<RefCell<Option<Viewer>>>,
 }
 
@@ -70,11 +45,11 @@ impl eframe::App for Window {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let Some(viewer) = &mut self.viewer else { return };
         if let Some(state) = frame.wgpu_render_state() {
-            // A loss is told to who asks.
-            let _told = state.device.poll(eframe::wgpu::PollType::Poll);
+            // Only polling reports a loss.
+            let _status = state.device.poll(eframe::wgpu::PollType::Poll);
         }
         if viewer.has_lost_device() {
-            // Whatever is painted now would end the program.
+            // Painting without a device would end the program.
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         } else {
             viewer.ui(ui);
@@ -83,7 +58,7 @@ impl eframe::App for Window {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         if let Some(viewer) = &self.viewer {
-            eframe::set_value(storage, SETTINGS, viewer.settings());
+            eframe::set_value(storage, SETTINGS, &viewer.settings());
         }
     }
 
@@ -95,7 +70,7 @@ impl eframe::App for Window {
     }
 }
 
-/// A device that is lost again this soon is not opened anew.
+/// After a device that is lost this soon no other one is opened.
 const SOON: Duration = Duration::from_secs(5);
 
 /// Runs the program in a window, and in another one with what was open when the graphics device is lost.
@@ -109,7 +84,7 @@ pub fn main() -> ExitCode {
             eprintln!("error: cannot open a window: {error}");
             return ExitCode::FAILURE;
         }
-        let lost = kept.borrow().as_ref().and_then(|viewer| viewer.lost.get().cloned());
+        let lost = kept.borrow().as_ref().and_then(Viewer::loss);
         let Some(message) = lost else { return ExitCode::SUCCESS };
         if start.elapsed() < SOON {
             eprintln!("error: {message}");
@@ -118,7 +93,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// One window, until it is closed; `kept` is taken over and may be left behind.
+/// One window, until it is closed. It goes on with the viewer in `kept`, and leaves its own there when its
+/// device is lost.
 fn run(files: &[PathBuf], kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("gpbrdf viewer")

@@ -209,11 +209,11 @@ mod tests {
     #[test]
     fn files_are_opened_by_content() {
         let Some(dir) = data_dir() else { return };
-        let rgl = Source::open(&dir.join("rgl/paper_blue_rgb.bsdf")).unwrap();
+        let rgl = Source::open(dir.join("rgl/paper_blue_rgb.bsdf")).unwrap();
         assert_eq!((rgl.name.as_str(), rgl.kind.as_str()), ("paper_blue_rgb", "RGL measurement"));
         assert!(rgl.description.contains("Blue A4 paper") && rgl.sha256.len() == 64);
-        let cornell = Source::open(&dir.join("cornell/cayman.brdf")).unwrap();
+        let cornell = Source::open(dir.join("cornell/cayman.brdf")).unwrap();
         assert!(cornell.brdf().is_err() && cornell.table().is_err());
-        assert!(Source::open(&dir.join("rgl/absent.bsdf")).is_err());
+        assert!(Source::open(dir.join("rgl/absent.bsdf")).is_err());
     }
 }

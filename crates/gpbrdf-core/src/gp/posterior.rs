@@ -124,3 +124,11 @@ pub struct KernelSum<'a> {
     /// The number of channels.
     pub n_channels: usize,
 }
+
+impl KernelSum<'_> {
+    /// The number of samples.
+    #[must_use]
+    pub fn n_samples(&self) -> usize {
+        self.inputs.len() / 3
+    }
+}

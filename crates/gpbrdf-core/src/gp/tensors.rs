@@ -65,6 +65,7 @@ pub struct TensorReader<'a> {
 
 impl TensorReader<'_> {
     /// An error of this file.
+    #[must_use]
     pub fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::Format {
             format: "model",
@@ -76,6 +77,7 @@ impl TensorReader<'_> {
 
     /// An error about the whole of what was read.
     #[expect(clippy::needless_pass_by_value, reason = "it is handed to map_err")]
+    #[must_use]
     pub fn damaged(&self, error: Error) -> Error {
         self.wrong("a consistent model", error.to_string())
     }

@@ -247,7 +247,7 @@ impl Sums {
 }
 
 /// The median, the mean of the middle two of an even number; 0 of nothing. Reorders the values.
-fn median(values: &mut [f32]) -> f64 {
+pub(super) fn median(values: &mut [f32]) -> f64 {
     if values.is_empty() {
         return 0.0;
     }

@@ -4,6 +4,7 @@ mod environment;
 mod image;
 pub(crate) mod image_metrics;
 mod metrics;
+mod sample_metrics;
 pub(crate) mod sphere;
 mod ssim;
 
@@ -11,6 +12,7 @@ pub use environment::{EnvDirection, Environment};
 pub use image::Image;
 pub use image_metrics::{ImageMetrics, PixelDifference, exposed_difference, exposure_of, psnr, ssim};
 pub use metrics::{CellMetrics, Interval, Metrics};
+pub use sample_metrics::SampleMetrics;
 pub use sphere::{
     DistantLight, ENV_PATCHES, POINT_LIGHT, SPHERE_SIZE, ShadingFrame, environment_lights, render_env,
     render_point, render_sphere,

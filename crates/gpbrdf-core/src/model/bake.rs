@@ -84,11 +84,11 @@ mod tests {
     use crate::model::{FitOptions, IntervalOf, fit};
     use crate::sample::{LatticeLayout, Layout, Symmetry};
 
-    fn model(symmetry: Symmetry, solver: Solver, per_channel: bool, kernel: Vec<Shape>) -> Model {
+    fn model(symmetry: Symmetry, solver: Solver, per_channel: bool, kernel: &[Shape]) -> Model {
         let source = Source::built_in("red-plastic").unwrap();
         let layout = LatticeLayout { shape: [10, 8, 6], symmetry, ..LatticeLayout::default() };
         let samples = source.measure(&Layout::Lattice(layout)).unwrap();
-        let options = FitOptions { solver, per_channel, ..FitOptions::default() }.with_kernel(&kernel);
+        let options = FitOptions { solver, per_channel, ..FitOptions::default() }.with_kernel(kernel);
         fit(&samples, &options).unwrap().model
     }
 
@@ -104,10 +104,10 @@ mod tests {
 
     #[test]
     fn tables_hold_what_the_model_predicts() {
-        let sum = vec![Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }];
+        let sum = &[Shape::Matern32, Shape::RationalQuadratic { alpha: 1.0 }];
         for model in [
-            model(Symmetry::Bilateral, Solver::Lattice, false, vec![Shape::Matern52]),
-            model(Symmetry::Reciprocal, Solver::Lattice, true, vec![Shape::SquaredExponential]),
+            model(Symmetry::Bilateral, Solver::Lattice, false, &[Shape::Matern52]),
+            model(Symmetry::Reciprocal, Solver::Lattice, true, &[Shape::SquaredExponential]),
             model(Symmetry::Reciprocal, Solver::Lattice, false, sum),
         ] {
             let angles: Vec<_> = cells().map(center).collect();
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn dense_tables_hold_the_mean_and_interpolate_sigma() {
-        let model = model(Symmetry::Bilateral, Solver::Dense, false, vec![Shape::Matern52]);
+        let model = model(Symmetry::Bilateral, Solver::Dense, false, &[Shape::Matern52]);
         let (mean, sigma) = (bake_mean(&model), bake_sigma(&model).unwrap());
         let angles: Vec<_> = cells().map(center).collect();
         let (values, variances) =
@@ -154,7 +154,7 @@ mod tests {
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let model = model(Symmetry::Bilateral, Solver::Lattice, false, vec![Shape::Matern52]);
+                let model = model(Symmetry::Bilateral, Solver::Lattice, false, &[Shape::Matern52]);
                 (bake_mean(&model), bake_sigma(&model).unwrap())
             })
         };

@@ -56,13 +56,22 @@ impl Intervals<'_> {
         self.about(self.mean.lookup(at).map(f64::from), self.sigma.lookup(at).map(f64::from))
     }
 
-    /// Lower and upper ends about means in sr^-1, with the latent standard deviation of each channel.
-    #[must_use]
-    pub fn about(&self, mean: Rgb, sigma: Rgb) -> (Rgb, Rgb) {
-        let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
-            let standard_deviation = (sigma[c] * sigma[c] + self.noise_variances[c]).sqrt();
-            interval_about(self.transform, self.transform.forward(mean[c]), standard_deviation)
-        });
-        (ends.map(|e| e.0), ends.map(|e| e.1))
+    fn about(&self, mean: Rgb, sigma: Rgb) -> (Rgb, Rgb) {
+        measurement_interval(self.transform, self.noise_variances, mean, sigma)
     }
+}
+
+/// Both ends of the 95 % interval of a new measurement about a mean in sr^-1, with the latent standard deviation of each
+/// channel.
+pub(crate) fn measurement_interval(
+    transform: Transform,
+    noise_variances: Rgb,
+    mean: Rgb,
+    sigma: Rgb,
+) -> (Rgb, Rgb) {
+    let ends: [(f64, f64); 3] = std::array::from_fn(|c| {
+        let standard_deviation = (sigma[c] * sigma[c] + noise_variances[c]).sqrt();
+        interval_about(transform, transform.forward(mean[c]), standard_deviation)
+    });
+    (ends.map(|e| e.0), ends.map(|e| e.1))
 }

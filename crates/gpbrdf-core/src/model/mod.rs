@@ -194,6 +194,13 @@ impl Model {
         Ok(out)
     }
 
+    /// Both ends of the 95 % interval of a new measurement about a predictive mean in sr^-1, with the latent standard
+    /// deviation of each channel in target units.
+    #[must_use]
+    pub fn interval_about(&self, mean: Rgb, sigma: Rgb) -> (Rgb, Rgb) {
+        interval::measurement_interval(self.transform, self.noise_variances(), mean, sigma)
+    }
+
     /// Mean and 95 % interval at each pair of directions: the interval of the target, carried back, so it is
     /// asymmetric about the mean and never negative.
     ///

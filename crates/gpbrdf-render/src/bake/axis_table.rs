@@ -1,101 +1,132 @@
 //! Functions of one coordinate as piecewise cubics.
 
-use gpbrdf_core::SeparableForm;
+use gpbrdf_core::gp::SeparableForm;
 
-use super::narrow;
+use crate::gpu_types::narrow;
 
 /// Largest error of a cubic, as a share of the largest value of its function.
 const TOLERANCE: f64 = 4e-6;
 /// Largest error of the residual deviation, as a share of the prior one.
 const DEVIATION_TOLERANCE: f64 = 2e-5;
-/// Most cubics between two breaks.
+/// The largest number of pieces between two breaks.
 const MOST_PIECES: usize = 64;
-/// Where each cubic interpolates.
+/// The places of a piece where its cubic interpolates.
 const NODES: [f64; 4] = [0.0, 0.25, 0.75, 1.0];
-/// Where it is checked.
+/// The places of a piece where its cubic is checked.
 const CHECKS: [f64; 3] = [0.1, 0.5, 0.9];
 
 /// All functions of the second axis of a process, and its residual deviation, over `[0, 1]`.
 ///
-/// Between nodes they are smooth, at nodes they may have kinks; so the intervals end at the nodes, and each is cut into as
-/// many pieces as the tolerances ask for. A kernel of smoothness `nu` goes like `s^(2 nu)` at a distance `s` from a node and
-/// the deviation, the root of the residual variance, like `s^nu` (at most `s`), which no polynomial in `s` follows. Pieces
-/// and cubics are therefore even in `q` with `s = 2 q^2` in the first half of an interval and `1 - s = 2 (1 - q)^2` in the
-/// second: `q^(4 nu)` and `q^(2 nu)`.
+/// The functions are smooth between nodes and may have kinks at nodes. Intervals therefore end at the nodes,
+/// and each interval is cut into as many pieces as the tolerances require.
+///
+/// At a small distance `s` from a node, a kernel of smoothness `nu` behaves like `s^(2 nu)` and the
+/// deviation, the root of the residual variance, like `s^nu`, but at most like `s`. No polynomial in `s`
+/// follows such a power. Pieces are therefore equally long, and cubics are polynomials, in a graded
+/// coordinate `q`: `s = 2 q^2` in the first half of an interval and `1 - s = 2 (1 - q)^2` in the second half.
+/// There the powers become `q^(4 nu)` and `q^(2 nu)`.
 #[derive(Clone, Debug)]
 pub(super) struct AxisTable {
     /// Ends of the intervals, ascending.
     pub(super) breaks: Vec<f32>,
-    /// Cubics in each interval, an even number.
+    /// Pieces of each interval, an even number.
     pub(super) pieces: usize,
-    /// `[interval][piece][function, then the residual deviation]`: the coefficients of 1, x, x^2, x^3 over a piece's
-    /// `[0, 1]` in `q`.
+    /// `[interval][piece][function, then the residual deviation]`: the coefficients of 1, x, x^2, x^3, where
+    /// x is the place in the piece, from 0 to 1 and linear in `q`.
     pub(super) cubics: Vec<[f32; 4]>,
-    /// Prior variance, the same everywhere.
+    /// Prior variance, which is the same everywhere.
     pub(super) prior: f64,
 }
 
 impl AxisTable {
-    /// Tabulates the second axis, whose nodes stand at `nodes`.
+    /// Tabulates the functions of the second axis, whose nodes are at `nodes`, with as few pieces as the
+    /// tolerances allow.
     pub(super) fn new(form: &SeparableForm<'_>, nodes: &[f64]) -> Self {
-        let mut breaks: Vec<f64> = nodes.iter().copied().filter(|x| (1e-6..1.0 - 1e-6).contains(x)).collect();
-        breaks.extend([0.0, 1.0]);
-        breaks.sort_by(f64::total_cmp);
-        breaks.dedup_by(|b, a| *b - *a < 1e-6);
+        let breaks = breaks(nodes);
         let mut pieces = 4;
         loop {
-            let points = |at: &[f64]| -> Vec<f64> {
-                let mut out = Vec::with_capacity(at.len() * pieces * breaks.len());
-                for ends in breaks.windows(2) {
-                    for piece in 0..pieces {
-                        let share = |x: f64| graded((piece as f64 + x) / pieces as f64);
-                        out.extend(at.iter().map(|&x| ends[0] + (ends[1] - ends[0]) * share(x)));
-                    }
-                }
-                out
-            };
-            let functions = |at: &[f64]| {
-                let basis = form.basis(1, &points(at));
-                let rows = basis.values.chunks(form.shape()[1]).zip(&basis.residual);
-                let rows: Vec<Vec<f64>> = rows
-                    .map(|(row, residual)| row.iter().copied().chain([residual.sqrt()]).collect())
-                    .collect();
-                (rows, basis.prior)
-            };
-            let (values, prior) = functions(&NODES);
-            let prior = prior.first().copied().unwrap_or(0.0);
-            let cubics: Vec<Vec<[f64; 4]>> = values
-                .chunks(NODES.len())
-                .map(|rows| (0..rows[0].len()).map(|f| cubic([0, 1, 2, 3].map(|n| rows[n][f]))).collect())
-                .collect();
-            let (checks, _) = functions(&CHECKS);
-            let deviation = form.shape()[1];
-            let mut largest = vec![0.0f64; deviation + 1];
-            let mut error = largest.clone();
-            for (cubics, rows) in cubics.iter().zip(checks.chunks(CHECKS.len())) {
-                for (row, x) in rows.iter().zip(CHECKS) {
-                    for (f, value) in row.iter().enumerate() {
-                        let [a, b, c, d] = cubics[f];
-                        let found = a + x * (b + x * (c + x * d));
-                        largest[f] = largest[f].max(value.abs());
-                        error[f] = error[f].max((found - value).abs());
-                    }
-                }
-            }
-            let good =
-                error[..deviation].iter().zip(&largest).all(|(error, largest)| *error <= TOLERANCE * largest)
-                    && error[deviation] <= DEVIATION_TOLERANCE * prior.sqrt();
-            if good || pieces >= MOST_PIECES {
+            let fit = Fit::new(form, &breaks, pieces);
+            if fit.is_good() || pieces >= MOST_PIECES {
                 return Self {
                     breaks: breaks.into_iter().map(narrow).collect(),
                     pieces,
-                    cubics: cubics.into_iter().flatten().map(|cubic| cubic.map(narrow)).collect(),
-                    prior,
+                    cubics: fit.cubics.into_iter().flatten().map(|cubic| cubic.map(narrow)).collect(),
+                    prior: fit.prior,
                 };
             }
             pieces *= 2;
         }
     }
+}
+
+/// The ends of intervals: 0, the nodes between, and 1.
+fn breaks(nodes: &[f64]) -> Vec<f64> {
+    let mut breaks: Vec<f64> = nodes.iter().copied().filter(|x| (1e-6..1.0 - 1e-6).contains(x)).collect();
+    breaks.extend([0.0, 1.0]);
+    breaks.sort_by(f64::total_cmp);
+    breaks.dedup_by(|b, a| *b - *a < 1e-6);
+    breaks
+}
+
+/// Cubics for a number of pieces, and how far they are off.
+struct Fit {
+    /// `[interval and piece][function, then the residual deviation]`.
+    cubics: Vec<Vec<[f64; 4]>>,
+    prior: f64,
+    /// The largest value of each function, then that of the residual deviation, at the points of [`CHECKS`].
+    largest: Vec<f64>,
+    /// The largest errors there.
+    error: Vec<f64>,
+}
+
+impl Fit {
+    fn new(form: &SeparableForm<'_>, breaks: &[f64], pieces: usize) -> Self {
+        let (values, prior) = functions(form, &points(breaks, pieces, &NODES));
+        let cubics: Vec<Vec<[f64; 4]>> = values
+            .chunks(NODES.len())
+            .map(|rows| (0..rows[0].len()).map(|f| cubic([0, 1, 2, 3].map(|n| rows[n][f]))).collect())
+            .collect();
+        let mut largest = vec![0.0f64; form.shape()[1] + 1];
+        let mut error = largest.clone();
+        let (checks, _) = functions(form, &points(breaks, pieces, &CHECKS));
+        for (cubics, rows) in cubics.iter().zip(checks.chunks(CHECKS.len())) {
+            for (row, x) in rows.iter().zip(CHECKS) {
+                for (f, value) in row.iter().enumerate() {
+                    let [a, b, c, d] = cubics[f];
+                    let found = a + x * (b + x * (c + x * d));
+                    largest[f] = largest[f].max(value.abs());
+                    error[f] = error[f].max((found - value).abs());
+                }
+            }
+        }
+        Self { cubics, prior, largest, error }
+    }
+
+    fn is_good(&self) -> bool {
+        let Some((deviation, errors)) = self.error.split_last() else { return true };
+        errors.iter().zip(&self.largest).all(|(error, largest)| *error <= TOLERANCE * largest)
+            && *deviation <= DEVIATION_TOLERANCE * self.prior.sqrt()
+    }
+}
+
+/// The points at the places `at` of all pieces of all intervals.
+fn points(breaks: &[f64], pieces: usize, at: &[f64]) -> Vec<f64> {
+    let mut points = Vec::with_capacity(at.len() * pieces * breaks.len());
+    for ends in breaks.windows(2) {
+        for piece in 0..pieces {
+            let share = |x: f64| graded((piece as f64 + x) / pieces as f64);
+            points.extend(at.iter().map(|&x| ends[0] + (ends[1] - ends[0]) * share(x)));
+        }
+    }
+    points
+}
+
+/// At each point the value of each function and, last, the residual deviation; and the prior variance.
+fn functions(form: &SeparableForm<'_>, points: &[f64]) -> (Vec<Vec<f64>>, f64) {
+    let basis = form.basis(1, points);
+    let rows = basis.values.chunks(form.shape()[1]).zip(&basis.residual);
+    let rows = rows.map(|(row, residual)| row.iter().copied().chain([residual.sqrt()]).collect());
+    (rows.collect(), basis.prior.first().copied().unwrap_or(0.0))
 }
 
 /// The place in an interval, `s`, of the graded coordinate `q`; both in `[0, 1]`.

@@ -1,75 +1,82 @@
 //! From a model to a texture, on the device.
+//!
+//! The shaders know two forms of a process: a separable form and a kernel sum, as [`DeviceForm`] tells.
 
 mod axis_table;
-mod dense;
-mod lattice;
-mod uniforms;
+pub(crate) mod kernel_source;
+pub(crate) mod kernel_sum;
+mod separable;
+mod targets;
 
-use std::collections::HashMap;
 use std::ops::ControlFlow;
-use std::sync::Mutex;
 
-use gpbrdf_core::{InputSpace, Model, N_THETA_D, N_THETA_H, Process, TableGeometry, Transform};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart};
+use gpbrdf_core::sample::InputSpace;
+use gpbrdf_core::{Model, Transform};
 
 use crate::context::Context;
 use crate::error::{Error, Result};
+use crate::gpu_types::{Finish, TransformKind, narrow, to_u32};
+use crate::shader;
 use crate::texture::{BrdfTexture, Precision};
-use uniforms::Finish;
+use separable::{Placement, Separable};
+use targets::Targets;
 
-const LATTICE_WGSL: &str = include_str!("../../shaders/bake/lattice.wgsl");
-const FINISH_WGSL: &str = include_str!("../../shaders/bake/finish.wgsl");
-
-/// Bakes models on a device. Compiles its shaders once; keep it.
+/// Bakes models on a device. The constructor compiles shaders, so keep the baker.
 ///
-/// - A lattice model is contracted along `theta_h` and `phi_d`, then evaluated along `theta_d` from cubics
-///   ([`gpbrdf_core::SeparableForm`]): every kernel, in single precision, and sigma with the mean. Inducing lattices are
-///   three of them, mixed into colours.
-/// - A dense model is a sum of kernel values over all samples, in f64 where the device computes in it. In single precision
-///   the sum cancels; models that would lose more than four digits are refused ([`Error::NoShader`]), as is the Matern
-///   kernel of general order, a Bessel function. Sigma is left at 0.
+/// - A lattice model is baked in its separable form ([`gpbrdf_core::gp::SeparableForm`]): contracted along
+///   `theta_h` and `phi_d`, then evaluated along `theta_d` from cubics. This works with every kernel, in
+///   single precision, and gives sigma with the mean. A model of inducing lattices is the sum of three such
+///   forms, each mixed into all channels.
+/// - A dense model is baked as a sum of kernel values over all samples, in f64 where the device has it. In
+///   single precision the sum cancels, so models that would lose more than four digits are refused
+///   ([`Error::NoShader`]). The Matern kernel of general order, a Bessel function, is refused too. Sigma is
+///   left at 0.
 #[derive(Debug)]
 pub struct Baker {
     context: Context,
-    lattice: lattice::Pipelines,
-    /// By precision of the texels.
+    separable: separable::Pipelines,
+    kernel_sum: kernel_sum::Pipelines,
+    /// For texels in half and in single precision.
     finish: [wgpu::ComputePipeline; 2],
-    /// By source.
-    dense: Mutex<HashMap<String, wgpu::ComputePipeline>>,
 }
 
-/// Asked between dispatches with the share of the work that is done, in `[0, 1]`; [`ControlFlow::Break`] cancels.
+/// A function that is called between dispatches with the share of the work that is done, in `[0, 1]`. It
+/// cancels the work by [`ControlFlow::Break`].
 pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 
-/// A model on its way to a texture: one target a distinct cell.
-struct Targets {
-    geometry: TableGeometry,
-    /// As `geometry.distinct()`, but the least of all components of the process: each has a space of its own, and a cell at
-    /// the horizon may round to either side of it.
-    distinct: Vec<usize>,
-    /// `[i_theta_h][row][i_theta_d]`: target without its prior mean, and sigma. Of inducing lattices as many again hold the
-    /// variances of the channels.
-    buffer: wgpu::Buffer,
+/// A summand of the targets of a model.
+struct Part<'a> {
+    space: InputSpace,
+    form: Form<'a>,
 }
 
-impl Targets {
-    fn new(context: &Context, model: &Model) -> Result<Self> {
-        let (space, others, copies) = match &model.process {
-            Process::Inducing(gp) => {
-                let spaces: Vec<InputSpace> = gp.components.iter().map(|c| c.lattice().space).collect();
-                (spaces.first().copied().unwrap_or(model.space), spaces, 2)
+/// What the shaders can evaluate, and how its channels contribute to those of the model.
+enum Form<'a> {
+    Separable(Box<Separable<'a>>, Placement),
+    KernelSum(KernelSum<'a>, usize),
+}
+
+/// The parts of a model.
+fn parts(model: &Model) -> Result<Vec<Part<'_>>> {
+    let mut parts = Vec::new();
+    for (first, posterior) in model.posteriors() {
+        match posterior.device_form() {
+            DeviceForm::Separable(summands) => {
+                for SeparablePart { gp, space, colour } in summands {
+                    let placement =
+                        colour.map_or(Placement::Channels { first }, |colour| Placement::Mixed { colour });
+                    let form = Form::Separable(Box::new(Separable::new(gp)?), placement);
+                    parts.push(Part { space: space.into(), form });
+                }
             }
-            _ => (model.space, Vec::new(), 1),
-        };
-        let geometry = TableGeometry::new(space);
-        let mut distinct = geometry.distinct().to_vec();
-        for other in others {
-            let found = TableGeometry::new(other);
-            distinct.iter_mut().zip(found.distinct()).for_each(|(least, &n)| *least = n.min(*least));
+            DeviceForm::KernelSum(sum) => {
+                parts.push(Part { space: sum.space, form: Form::KernelSum(sum, first) });
+            }
+            _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
         }
-        let cells = copies * N_THETA_H * geometry.third().len() * N_THETA_D;
-        let buffer = context.empty_buffer("targets", 16 * cells as u64, wgpu::BufferUsages::STORAGE)?;
-        Ok(Self { geometry, distinct, buffer })
     }
+    Ok(parts)
 }
 
 impl Baker {
@@ -79,12 +86,12 @@ impl Baker {
     /// Those of [`Context::guard`].
     pub fn new(context: &Context) -> Result<Self> {
         let finish = |precision: Precision| {
-            context.compute_pipeline("bake: texels", &finish_wgsl(precision), "write_table")
+            context.compute_pipeline("bake: texels", &shader::finish(precision), "write_table")
         };
         Ok(Self {
-            lattice: lattice::Pipelines::new(context)?,
+            separable: separable::Pipelines::new(context)?,
+            kernel_sum: kernel_sum::Pipelines::default(),
             finish: [finish(Precision::Half)?, finish(Precision::Single)?],
-            dense: Mutex::default(),
             context: context.clone(),
         })
     }
@@ -92,7 +99,8 @@ impl Baker {
     /// Bakes the predictive mean, and sigma of lattices, into a new texture.
     ///
     /// # Errors
-    /// [`Error::NoShader`] for a model the device cannot bake, [`Error::Cancelled`], and those of [`Context::guard`].
+    /// [`Error::NoShader`] for a model that the device cannot bake, [`gpbrdf_core::Error::Cancelled`] on
+    /// request of `progress` ([`Error::is_cancelled`]), and those of [`Context::guard`].
     pub fn bake(
         &self,
         model: &Model,
@@ -104,52 +112,48 @@ impl Baker {
         Ok(texture)
     }
 
-    /// Bakes into a texture that is there already. After an error it holds what it held before.
+    /// Bakes into an existing texture. After an error it holds what it held before.
     ///
     /// # Errors
     /// Those of [`Baker::bake`].
     pub fn bake_into(&self, model: &Model, texture: &BrdfTexture, progress: &mut Progress<'_>) -> Result<()> {
-        // Its layers stay black there, with no error.
+        // On OpenGL the layers would stay black, without an error.
         if self.context.info().backend == wgpu::Backend::Gl {
             return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
         }
-        let targets = Targets::new(&self.context, model)?;
-        let mut first_channel = 0;
-        match &model.process {
-            Process::Lattice(groups) => {
-                for (i, gp) in groups.iter().enumerate() {
-                    ask(progress, i as f64 / groups.len() as f64)?;
-                    self.lattice.add(&self.context, gp, &targets, first_channel)?;
-                    first_channel += gp.data().channels;
+        let context = &self.context;
+        let parts = parts(model)?;
+        let targets = Targets::new(context, model.space(), &parts)?;
+        let mut mixed = false;
+        for (i, part) in parts.iter().enumerate() {
+            let share = |done: f64| (i as f64 + done) / parts.len() as f64;
+            match &part.form {
+                Form::Separable(process, placement) => {
+                    report(progress, share(0.0))?;
+                    let geometry = targets.geometry_of(part.space);
+                    self.separable.add(context, process, &geometry, &targets, *placement)?;
+                    mixed |= matches!(placement, Placement::Mixed { .. });
                 }
-            }
-            Process::Dense(groups) => {
-                for (i, gp) in groups.iter().enumerate() {
-                    let share = |done: f64| (i as f64 + done) / groups.len() as f64;
+                Form::KernelSum(process, first_channel) => {
                     let mut within = |done: f64| progress(share(done));
-                    self.add_dense(gp, &targets, first_channel, &mut within)?;
-                    first_channel += gp.channels();
+                    self.kernel_sum.add(context, process, *first_channel, &targets, &mut within)?;
                 }
             }
-            Process::Inducing(gp) => {
-                for k in 0..gp.components.len() {
-                    ask(progress, k as f64 / gp.components.len() as f64)?;
-                    self.lattice.add_component(&self.context, gp, k, &targets)?;
-                }
-            }
-            _ => return Err(Error::NoShader { what: "this kind of process".to_owned() }),
+        }
+        if mixed {
+            self.separable.finish_sigma(context, &targets)?;
         }
         self.finish(model, &targets, texture)?;
-        ask(progress, 1.0)
+        report(progress, 1.0)
     }
 
-    /// Carries targets back to sr^-1 and writes the texels.
+    /// Transforms targets back to sr^-1 and writes the texels.
     fn finish(&self, model: &Model, targets: &Targets, texture: &BrdfTexture) -> Result<()> {
         const WHAT: &str = "bake: texels";
         let (transform, epsilon) = match model.transform {
-            Transform::Identity => (0, 0.0),
-            Transform::Log { epsilon } => (1, epsilon),
-            Transform::CubeRoot => (2, 0.0),
+            Transform::Identity => (TransformKind::Identity, 0.0),
+            Transform::Log { epsilon } => (TransformKind::Log, epsilon),
+            Transform::CubeRoot => (TransformKind::CubeRoot, 0.0),
             _ => return Err(Error::NoShader { what: format!("the transform {:?}", model.transform) }),
         };
         let [r, g, b] = model.offsets.map(narrow);
@@ -157,64 +161,32 @@ impl Baker {
             offsets: [r, g, b, 0.0],
             transform,
             epsilon: narrow(epsilon),
-            rows: to_u32(targets.geometry.third().len()),
+            rows: to_u32(targets.rows()),
             largest: if texture.precision() == Precision::Half { 65_504.0 } else { f32::MAX },
         };
         let distinct: Vec<u32> = targets.distinct.iter().map(|&n| to_u32(n)).collect();
         let context = &self.context;
         let uniform = context.uniform(&uniform)?;
-        let distinct = context.buffer_of(
-            "distinct cells",
-            bytemuck::cast_slice(&distinct),
-            wgpu::BufferUsages::STORAGE,
-        )?;
+        let storage = wgpu::BufferUsages::STORAGE;
+        let distinct = context.buffer_of("distinct cells", bytemuck::cast_slice(&distinct), storage)?;
         let pipeline = &self.finish[usize::from(texture.precision() == Precision::Single)];
         context.guard(WHAT, || {
-            let group = context.bind_group(
-                pipeline,
-                [
-                    uniform.as_entire_binding(),
-                    targets.buffer.as_entire_binding(),
-                    distinct.as_entire_binding(),
-                    wgpu::BindingResource::TextureView(texture.view()),
-                ],
-            );
-            context.dispatch(pipeline, &group, [3, 45, 180]);
+            let resources = [
+                (0, uniform.as_entire_binding()),
+                (1, targets.buffer.as_entire_binding()),
+                (2, distinct.as_entire_binding()),
+                (3, wgpu::BindingResource::TextureView(texture.view())),
+            ];
+            let group = context.bind_group(pipeline, resources);
+            context.dispatch(pipeline, &group, targets::whole_table());
         })
     }
 }
 
-fn finish_wgsl(precision: Precision) -> String {
-    let format = match precision {
-        Precision::Half => "rgba16float",
-        Precision::Single => "rgba32float",
-    };
-    FINISH_WGSL.replace("TEXEL_FORMAT,", &format!("{format},"))
-}
-
-fn ask(progress: &mut Progress<'_>, done: f64) -> Result<()> {
+/// Reports the share of the work that is done; an error if that cancels the work.
+fn report(progress: &mut Progress<'_>, done: f64) -> Result<()> {
     match progress(done) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Error::Cancelled),
+        ControlFlow::Break(()) => Err(Error::cancelled()),
     }
 }
-
-/// Rounds to the device's precision.
-#[expect(clippy::cast_possible_truncation, reason = "f32 is the device's precision")]
-fn narrow(x: f64) -> f32 {
-    x as f32
-}
-
-/// `x` as two f32 whose sum is `x` to 48 bits.
-fn split(x: f64) -> [f32; 2] {
-    let high = narrow(x);
-    [high, narrow(x - f64::from(high))]
-}
-
-/// A count of cells, functions or samples.
-fn to_u32(n: usize) -> u32 {
-    u32::try_from(n).unwrap_or(u32::MAX)
-}
-
-#[cfg(test)]
-mod tests;

@@ -101,7 +101,7 @@ mod tests {
         let Some(dir) = data_dir() else { return };
         let fits = read_neural_csv(&dir.join("rgl/nbrdf_weights.csv")).unwrap();
         let fit = &fits.iter().find(|(name, _)| name.starts_with("paper_blue")).unwrap().1;
-        let source = Source::open(&dir.join("rgl/paper_blue_rgb.bsdf")).unwrap();
+        let source = Source::open(dir.join("rgl/paper_blue_rgb.bsdf")).unwrap();
         let truth = source.brdf().unwrap();
         for theta_h in [0.1, 0.4, 0.8] {
             let angles = crate::HalfDiff { theta_h, theta_d: 0.3, phi_d: 1.5 };

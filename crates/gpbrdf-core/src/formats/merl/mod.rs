@@ -24,7 +24,7 @@ use crate::formats::read::{NotFinite, open};
 pub(crate) const FORMAT: Format = Format {
     name: "MERL table",
     file: "MERL .binary",
-    recognises: recognises,
+    recognises,
     read: |path| Ok(Content::Table(read_merl(path)?)),
 };
 

@@ -1,0 +1,141 @@
+//! Photographs the viewer without a window:
+//! `cargo run --release -p gpbrdf-app --example photograph -- FOLDER [NAME...]`.
+//!
+//! Each picture is a PNG of that name in the folder; without names, all of them are made. A software adapter will do.
+#![expect(clippy::print_stdout, reason = "an example reports to a terminal")]
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use eframe::egui;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use gpbrdf_app::viewer::{Settings, Viewer};
+
+type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
+
+/// What is on a picture.
+struct Scene {
+    name: &'static str,
+    /// Size of the window in points, and pixels per point.
+    size: [f32; 2],
+    scale: f32,
+    /// What the viewer would remember from an earlier run; the rest is as at first.
+    settings: &'static str,
+    /// The label of what the pointer is on.
+    hovered: Option<&'static str>,
+    /// How long a picture converges that never ends by itself.
+    converges: Duration,
+}
+
+const PLAIN: Scene = Scene {
+    name: "viewer-overview",
+    size: [1360.0, 850.0],
+    scale: 1.0,
+    settings: "{}",
+    hovered: None,
+    converges: Duration::ZERO,
+};
+
+const SCENES: [Scene; 5] = [
+    PLAIN,
+    Scene {
+        name: "viewer-slices",
+        settings: r#"{"arrangement": "Slices"}"#,
+        hovered: Some("Prediction slice"),
+        ..PLAIN
+    },
+    Scene {
+        name: "viewer-curves",
+        settings: r#"{"arrangement": "Plots", "dark": false, "curves": {"kind": "ThetaH", "log": true}}"#,
+        ..PLAIN
+    },
+    Scene {
+        name: "viewer-object",
+        settings: r#"{"arrangement": "Sphere", "shape": "Knot", "sphere": "SideBySide"}"#,
+        converges: Duration::from_secs(5),
+        ..PLAIN
+    },
+    Scene { name: "viewer-large-text", size: [800.0, 500.0], scale: 2.0, ..PLAIN },
+];
+
+/// The empty margin that the harness leaves around the viewer, in points.
+const MARGIN: f32 = 8.0;
+
+/// Longer than any fit takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn main() -> Result {
+    let mut arguments = std::env::args().skip(1);
+    let folder = PathBuf::from(arguments.next().ok_or("expected a folder for the pictures")?);
+    let names: Vec<String> = arguments.collect();
+    std::fs::create_dir_all(&folder)?;
+    if let Some(unknown) = names.iter().find(|name| SCENES.iter().all(|scene| scene.name != **name)) {
+        let known = SCENES.map(|scene| scene.name).join(", ");
+        return Err(format!("expected pictures out of {known}, found {unknown}").into());
+    }
+    for scene in &SCENES {
+        if names.is_empty() || names.iter().any(|name| name == scene.name) {
+            photograph(scene, &folder.join(scene.name).with_extension("png"))?;
+        }
+    }
+    Ok(())
+}
+
+fn photograph(scene: &Scene, file: &Path) -> Result {
+    let settings: Settings = serde_json::from_str(scene.settings)?;
+    let mut first_error = None;
+    let mut harness = Harness::builder()
+        .with_size(scene.size)
+        .with_pixels_per_point(scene.scale)
+        .with_theme(egui::Theme::Dark)
+        .wgpu()
+        .build_ui_state(
+            move |ui, viewer: &mut Option<Viewer>| {
+                if viewer.is_none() && first_error.is_none() {
+                    match Viewer::new(ui.ctx(), settings.clone(), &[]) {
+                        Ok(made) => *viewer = Some(made),
+                        Err(error) => first_error = Some(error),
+                    }
+                }
+                if let Some(viewer) = viewer {
+                    viewer.ui(ui);
+                } else if let Some(error) = &first_error {
+                    ui.label(format!("{error:#}"));
+                }
+            },
+            None,
+        );
+    wait(&mut harness, |viewer| viewer.is_some_and(Viewer::is_settled))?;
+    let start = Instant::now();
+    wait(&mut harness, |_| start.elapsed() >= scene.converges)?;
+    if let Some(label) = scene.hovered {
+        let middle = harness.get_by_label(label).rect().center();
+        harness.hover_at(middle);
+    }
+    harness.run_steps(20);
+    let picture = harness.render()?;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
+    let margin = (MARGIN * scene.scale) as u32;
+    let [width, height] = [picture.width(), picture.height()].map(|side| side - 2 * margin);
+    let inner = image::imageops::crop_imm(&picture, margin, margin, width, height).to_image();
+    image::DynamicImage::from(inner).into_rgb8().save(file)?;
+    println!("{}", file.display());
+    if let Some(viewer) = harness.state_mut() {
+        viewer.close();
+    }
+    Ok(())
+}
+
+/// Frames until `done`.
+fn wait(harness: &mut Harness<'_, Option<Viewer>>, done: impl Fn(Option<&Viewer>) -> bool) -> Result {
+    let start = Instant::now();
+    while !done(harness.state().as_ref()) {
+        if start.elapsed() > PATIENCE {
+            return Err("the viewer is still busy after two minutes".into());
+        }
+        harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
+}

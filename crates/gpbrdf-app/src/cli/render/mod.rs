@@ -1,0 +1,336 @@
+//! `gpbrdf-cli render`: pictures of objects, without a window.
+
+mod choices;
+mod pictures;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail};
+use clap::{Args, value_parser};
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::base::number::significant;
+use gpbrdf_core::judge::{PixelDifference, exposure_of, psnr, ssim};
+use gpbrdf_core::{BrdfTable, Content, Source};
+use gpbrdf_render::{
+    AdapterChoice, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
+    Projection, Renderer, ShadingOptions, read_obj,
+};
+use serde_json::{Value, json};
+
+use super::input::{environment, open};
+use super::parse::{Exposure, parse_exposure, parse_pair, parse_positive, parse_size, parse_vector};
+use super::terminal::Terminal;
+use crate::job::{Backend, Baked, Baking, Job, ModelSpec, Observer, Run, Stage};
+use choices::{BackgroundName, LightName, SamplingName, ShowName, ToneName};
+use pictures::Pictures;
+
+/// Samples given to the device at a time.
+const CHUNK: u32 = 16;
+
+#[derive(Args, Debug)]
+pub(crate) struct Render {
+    /// A measurement, table or model file, or the name of a built-in material.
+    #[arg(default_value = "cherry-235")]
+    input: PathBuf,
+    /// Picture to write: .png (as shown) or .exr (linear). May be repeated.
+    #[arg(short, long, value_name = "FILE", default_value = "render.png")]
+    output: Vec<PathBuf>,
+    /// The object: sphere, knot, box, or a Wavefront .obj file.
+    #[arg(long, value_name = "sphere|knot|box|FILE", default_value = "sphere")]
+    scene: PathBuf,
+    /// A single light instead of an environment.
+    #[arg(long, value_enum, conflicts_with = "env")]
+    light: Option<LightName>,
+    /// Direction towards the directional light, or position of the point light; the object fills the unit
+    /// sphere.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "1,1,1.5",
+        value_parser = parse_vector,
+        allow_hyphen_values = true
+    )]
+    light_at: [f32; 3],
+    /// Environment map: studio, or a latitude-longitude .hdr or .exr file. [default: studio]
+    #[arg(long, value_name = "studio|FILE")]
+    env: Option<PathBuf>,
+    /// How directions of the environment's light are drawn: by the light, by the material, or by both.
+    #[arg(long, value_enum, default_value = "mis")]
+    sampling: SamplingName,
+    /// Samples per pixel.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=1 << 20))]
+    spp: u32,
+    /// Columns and rows of the picture.
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
+    size: [u32; 2],
+    /// Turn of the camera to the right and up, degrees.
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_pair, allow_hyphen_values = true)]
+    orbit: Option<[f32; 2]>,
+    /// Parallel rays; a unit sphere touches the frame, as in the image metrics.
+    #[arg(long)]
+    orthographic: bool,
+    /// Exposure in stops; auto brings the 90th percentile to 0.6.
+    #[arg(
+        long,
+        value_name = "auto|STOPS",
+        default_value = "auto",
+        value_parser = parse_exposure,
+        allow_hyphen_values = true
+    )]
+    exposure: Exposure,
+    /// Tone curve.
+    #[arg(long, value_enum, default_value = "filmic")]
+    tone: ToneName,
+    /// What the picture shows; the difference is prediction - truth in exposed linear light, red where too
+    /// bright.
+    #[arg(long, value_enum, default_value = "prediction")]
+    show: ShowName,
+    /// What is behind the object.
+    #[arg(long, value_enum, default_value = "environment")]
+    background: BackgroundName,
+    /// End of the scale of false colours. [default: chosen by the values]
+    #[arg(long, value_name = "VALUE", value_parser = parse_positive)]
+    limit: Option<f32>,
+    /// One picture of truth, prediction and difference, with PSNR and SSIM.
+    #[arg(long, conflicts_with_all = ["show", "background"])]
+    compare: bool,
+    #[command(flatten)]
+    model: ModelSpec,
+    /// Where to bake.
+    #[arg(long, value_enum, default_value_t)]
+    backend: Backend,
+    /// Print JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is rendered with: the tables of the truth and of the prediction, as far as they are shown.
+struct Materials {
+    truth: Option<BrdfTable>,
+    prediction: Option<Baked>,
+}
+
+/// A picture that has been rendered.
+struct Rendered {
+    linear: LinearPicture,
+    exposure: f64,
+    title: String,
+    report: Value,
+}
+
+impl Render {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        for path in &self.output {
+            if is_exr(path)? && self.compare {
+                bail!("\"{}\": expected a .png file, as --compare makes a figure", path.display());
+            }
+        }
+        let mut run = Run::new(terminal.clone());
+        // Whatever can fail at once comes first.
+        let context = Context::open(AdapterChoice::Any)?;
+        terminal.detail(&format!("adapter: {}", context.describe()));
+        let mut renderer = self.renderer(&context)?;
+        let source = run.stage(Stage::Load, || open(&self.input))?;
+        let materials = self.materials(&source, &mut run)?;
+        set_materials(&mut renderer, &context, &source, &materials)?;
+        run.stage(Stage::Render, || self.accumulate(&mut renderer))?;
+        let rendered = self.rendered(&source, &materials, &context, &renderer)?;
+        self.write(&mut renderer, &rendered)?;
+        let mut report = rendered.report;
+        report["seconds"] = serde_json::to_value(run.seconds())?;
+        report["outputs"] =
+            self.output.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().into();
+        self.say(&report, terminal)
+    }
+
+    /// A renderer of the scene, without materials.
+    fn renderer(&self, context: &Context) -> Result<Renderer> {
+        let mut renderer = Renderer::new(context, self.size)?;
+        let (geometry, camera) = self.scene()?;
+        renderer.set_geometry(&geometry)?;
+        renderer.set_camera(camera)?;
+        renderer.set_light(self.light()?)?;
+        let sampling = self.sampling.into();
+        renderer.set_shading(ShadingOptions { sampling, ..ShadingOptions::default() })?;
+        Ok(renderer)
+    }
+
+    /// Reads the picture back, and compares prediction and truth where both are there.
+    fn rendered(
+        &self,
+        source: &Source,
+        materials: &Materials,
+        context: &Context,
+        renderer: &Renderer,
+    ) -> Result<Rendered> {
+        let linear = renderer.read_linear()?;
+        let (truth, prediction) = linear.images()?;
+        let exposure = match self.exposure {
+            Exposure::Auto => exposure_of(&truth),
+            Exposure::Stops(stops) => f64::from(stops).exp2(),
+        };
+        let mut report = json!({
+            "material": source.name,
+            "scene": self.scene.display().to_string(),
+            "width": linear.width,
+            "height": linear.height,
+            "spp": renderer.samples(),
+            "adapter": context.describe(),
+            "exposure": exposure,
+        });
+        let mut title = source.name.clone();
+        if materials.truth.is_some() && materials.prediction.is_some() {
+            let psnr = psnr(&truth, &prediction, exposure)?;
+            let ssim = ssim(&truth, &prediction, exposure)?;
+            let difference = PixelDifference::new(&truth, &prediction)?;
+            title.push_str(&format!("   PSNR {psnr:.1} dB   SSIM {ssim:.4}"));
+            report["psnr"] = if psnr.is_finite() { json!(psnr) } else { json!(psnr.to_string()) };
+            report["ssim"] = json!(ssim);
+            report["pixel_difference"] = serde_json::to_value(difference)?;
+        }
+        Ok(Rendered { linear, exposure, title, report })
+    }
+
+    /// Writes all outputs or none.
+    fn write(&self, renderer: &mut Renderer, rendered: &Rendered) -> Result<()> {
+        #[expect(clippy::cast_possible_truncation, reason = "shaders compute in single precision")]
+        let display = Display {
+            exposure: rendered.exposure as f32,
+            tone: self.tone.into(),
+            background: self.background.into(),
+            ..Display::default()
+        };
+        let (linear, title) = (&rendered.linear, rendered.title.as_str());
+        let mut pictures = Pictures { renderer, linear, display, limit: self.limit, title };
+        let mut files = Vec::new();
+        for path in &self.output {
+            let mut file = AtomicFile::create(path)?;
+            let written = if is_exr(path)? {
+                pictures.write_exr(&mut file, self.show)
+            } else if self.compare {
+                pictures.write_comparison(&mut file)
+            } else {
+                pictures.write_png(&mut file, self.show)
+            };
+            written.with_context(|| format!("cannot write \"{}\"", path.display()))?;
+            files.push(file);
+        }
+        Ok(AtomicFile::commit_all(files)?)
+    }
+
+    fn say(&self, report: &Value, terminal: &Terminal) -> Result<()> {
+        if self.json {
+            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(report)?));
+        }
+        if let (Some(psnr), Some(ssim)) = (report["psnr"].as_f64(), report["ssim"].as_f64()) {
+            terminal.summary(&format!("PSNR {} dB, SSIM {}", significant(psnr, 4), significant(ssim, 4)))?;
+        }
+        for path in &self.output {
+            terminal.summary(&format!("wrote {}", path.display()))?;
+        }
+        Ok(())
+    }
+
+    fn scene(&self) -> Result<(Geometry, Camera)> {
+        let (geometry, orbit) = match self.scene.to_str() {
+            Some("sphere") => (Geometry::Sphere, [0.0, 0.0]),
+            Some("knot") => (Geometry::Mesh(Mesh::knot()), [8.0, -10.0]),
+            Some("box") => (Geometry::Mesh(Mesh::rounded_box()), [-33.0, 28.0]),
+            _ if self.scene.exists()
+                || self.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) =>
+            {
+                (Geometry::Mesh(read_obj(&self.scene)?), [0.0, 10.0])
+            }
+            _ => bail!(
+                "--scene: expected sphere, knot, box or an .obj file, found \"{}\"",
+                self.scene.display()
+            ),
+        };
+        let camera = if self.orthographic { Camera::default() } else { Camera::perspective(0.55, 0.88) };
+        let [azimuth, elevation] = match (self.orbit, camera.projection) {
+            (Some(orbit), _) => orbit,
+            (None, Projection::Orthographic { .. }) => [0.0; 2],
+            (None, Projection::Perspective { .. }) => orbit,
+        };
+        Ok((geometry, camera.orbited(azimuth.to_radians(), elevation.to_radians())))
+    }
+
+    fn light(&self) -> Result<Light> {
+        let at = self.light_at.into();
+        Ok(match self.light {
+            // Irradiance pi: a white Lambertian surface that faces the light has radiance 1.
+            Some(LightName::Directional) => {
+                Light::Directional { direction: at, irradiance: [std::f32::consts::PI; 3] }
+            }
+            Some(LightName::Point) => Light::Point { position: at, intensity: [std::f32::consts::PI; 3] },
+            None => {
+                let file = self.env.as_deref().filter(|path| *path != Path::new("studio"));
+                Light::Environment((&environment(file)?).into())
+            }
+        })
+    }
+
+    /// The tables that are shown, fitted and baked as far as need be.
+    fn materials(&self, source: &Source, run: &mut Run) -> Result<Materials> {
+        let is_model = matches!(source.content, Content::Model(_));
+        let (needs_truth, needs_prediction) = match self.show {
+            _ if self.compare => (true, true),
+            ShowName::Truth => (true, false),
+            ShowName::Prediction | ShowName::Sigma => (false, true),
+            ShowName::Difference => (true, true),
+        };
+        let truth = match source.table() {
+            Ok(table) if needs_truth && !is_model => Some(table.into_owned()),
+            _ if needs_truth => {
+                bail!("{}: expected a source with a truth to compare with, found none", source.origin())
+            }
+            _ => None,
+        };
+        let mut prediction = None;
+        if needs_prediction {
+            if !is_model {
+                self.model.check(source)?;
+            }
+            let baking = Some(Baking { backend: self.backend, sigma: true });
+            let job = Job { keep_model: true, baking, ..Job::new(source, &self.model) };
+            prediction = run.job(&job)?.baked;
+        }
+        Ok(Materials { truth, prediction })
+    }
+
+    fn accumulate(&self, renderer: &mut Renderer) -> Result<()> {
+        while renderer.samples() < self.spp {
+            renderer.render_more(CHUNK.min(self.spp - renderer.samples()))?;
+            renderer.wait()?;
+        }
+        Ok(())
+    }
+}
+
+/// Hands the tables to the renderer.
+fn set_materials(
+    renderer: &mut Renderer,
+    context: &Context,
+    source: &Source,
+    materials: &Materials,
+) -> Result<()> {
+    let upload = |table: &BrdfTable, sigma| BrdfTexture::upload(context, table, sigma, Precision::Half);
+    let truth = materials.truth.as_ref().map(|table| upload(table, None)).transpose()?;
+    match (&materials.prediction, &truth) {
+        (Some(baked), truth) => {
+            let prediction = upload(&baked.mean, baked.sigma.as_deref())?;
+            renderer.set_materials(truth.as_ref(), &prediction)?;
+        }
+        (None, Some(truth)) => renderer.set_materials(None, truth)?,
+        (None, None) => bail!("{}: nothing to render", source.origin()),
+    }
+    Ok(())
+}
+
+fn is_exr(path: &Path) -> Result<bool> {
+    match path.extension() {
+        Some(png) if png.eq_ignore_ascii_case("png") => Ok(false),
+        Some(exr) if exr.eq_ignore_ascii_case("exr") => Ok(true),
+        _ => bail!("\"{}\": expected a name that ends in .png or .exr", path.display()),
+    }
+}

@@ -1,0 +1,123 @@
+//! `gpbrdf-cli reproduce`: the paper's experiments, each a table and pictures.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use gpbrdf_core::Source;
+use gpbrdf_core::brdf::materials as built_in_materials;
+use gpbrdf_core::formats::{read_neural_csv, sha256_file};
+use serde_json::{Value, json};
+
+use super::input::environment;
+use super::terminal::Terminal;
+use crate::job::Observer;
+use crate::output::OutputFolder;
+use crate::reproduce::{Context, Experiment, PAPER_MATERIALS, measurements, store};
+
+#[derive(Args, Debug)]
+pub(crate) struct Reproduce {
+    /// Experiments to run. [default: all]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    only: Vec<Experiment>,
+    /// Smaller settings: a few minutes in all.
+    #[arg(long)]
+    quick: bool,
+    /// Folder of measurements: RGL .bsdf files, and MERL .binary files, which are recognised by their sha256.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Only these materials, by name.
+    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    materials: Vec<String>,
+    /// CSV file with the weights of Neural BRDF fits to compare with, 675 per material.
+    #[arg(long, value_name = "FILE")]
+    nbrdf: Option<PathBuf>,
+    /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
+    #[arg(long, value_name = "FILE")]
+    env: Option<PathBuf>,
+    /// Seconds that one dense fit may be expected to take; decides its number of samples.
+    /// [default: 60, or 1 with --quick]
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    budget: Option<f64>,
+    /// Folder for the outputs. Experiments whose results of the same options it holds are not run again.
+    #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
+    output: PathBuf,
+}
+
+impl Reproduce {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        OutputFolder::check(&self.output)?;
+        let budget = self.budget.unwrap_or(if self.quick { 1.0 } else { 60.0 });
+        if !(budget > 0.0 && budget.is_finite()) {
+            bail!("--budget: expected a positive number of seconds, found {budget}");
+        }
+        let measured =
+            self.data.as_deref().map_or(Ok(Vec::new()), |folder| measurements(folder, terminal))?;
+        for name in &self.materials {
+            let known = measured.iter().any(|s| &s.name == name)
+                || built_in_materials().iter().any(|m| m.name == name);
+            if !known {
+                bail!(
+                    "--materials: expected names of materials of --data or built-in ones, found \"{name}\""
+                );
+            }
+        }
+        let context = Context {
+            quick: self.quick,
+            budget,
+            environment: environment(self.env.as_deref())?,
+            only: self.materials.clone(),
+            neural: self.nbrdf.as_deref().map_or(Ok(Vec::new()), read_neural_csv)?,
+            built_in: PAPER_MATERIALS.into_iter().map(Source::built_in).collect::<Result<_, _>>()?,
+            measured,
+        };
+        let key = self.key(&context)?;
+        let chosen = |e: &Experiment| self.only.is_empty() || self.only.contains(e);
+        let (done, open): (Vec<_>, Vec<_>) = Experiment::ALL
+            .into_iter()
+            .filter(chosen)
+            .partition(|e| store::is_done(&self.output, e.name(), &key));
+        for experiment in done {
+            terminal.summary(&format!("{}: taken from \"{}\"", experiment.name(), self.output.display()))?;
+        }
+        let mut left: f64 = open.iter().map(|e| e.seconds(&context)).sum();
+        if left > 0.0 {
+            terminal.note(&format!("about {left:.0} s; what is done is kept when interrupted"));
+        }
+        for experiment in open {
+            let start = Instant::now();
+            let outcome = terminal.stage(experiment.name(), || experiment.run(&context))?;
+            let seconds = start.elapsed().as_secs_f64();
+            for table in &outcome.tables {
+                terminal.summary(&table.markdown())?;
+            }
+            let files = store::write(&self.output, experiment.name(), &key, seconds, outcome)?;
+            terminal.summary(&format!(
+                "{}: {seconds:.1} s, {files} files in \"{}\"",
+                experiment.name(),
+                self.output.display()
+            ))?;
+            left -= experiment.seconds(&context);
+            if left > 1.0 {
+                terminal.note(&format!("about {left:.0} s left"));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the results depend on: the options and the checksums of the inputs.
+    fn key(&self, context: &Context) -> Result<Value> {
+        let sum = |file: &Option<PathBuf>| file.as_ref().map(sha256_file).transpose();
+        let measured: Vec<&str> = context.measured.iter().map(|s| s.sha256.as_str()).collect();
+        Ok(json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "quick": self.quick,
+            "budget": context.budget,
+            "materials": self.materials,
+            "measurements": measured,
+            "nbrdf": sum(&self.nbrdf)?,
+            "env": sum(&self.env)?,
+        }))
+    }
+}

@@ -1,0 +1,34 @@
+//! One job for both programs: measure a source, fit a model to it, bake the model and judge the result.
+//!
+//! [`ModelSpec`] says how to measure and what to fit; it is read from a command line by clap and from a
+//! session of the viewer by serde. [`Run`] does the work and tells an [`Observer`] of its stages and results.
+//! [`Report`] is what the command line says about a run, to machines and to people.
+
+mod backend;
+mod choices;
+mod compression;
+mod forecast;
+#[cfg(feature = "viewer")]
+mod hyper;
+mod judge;
+mod kernels;
+mod report;
+mod run;
+mod sample;
+mod spec;
+mod stage;
+
+pub(crate) use backend::Backend;
+pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
+pub(crate) use forecast::samples_within;
+#[cfg(feature = "viewer")]
+pub(crate) use hyper::hyper_sliders;
+pub(crate) use judge::judge;
+pub(crate) use kernels::Kernels;
+pub(crate) use report::{Report, metric_lines};
+#[cfg(feature = "viewer")]
+pub(crate) use run::is_cancelled;
+pub(crate) use run::{Baked, Baking, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
+pub(crate) use sample::Measured;
+pub(crate) use spec::{ModelSpec, PAPER_SAMPLES};
+pub(crate) use stage::Stage;

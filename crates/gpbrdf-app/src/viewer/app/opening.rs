@@ -1,0 +1,102 @@
+//! Opens and restores: files, built-in materials, sessions and settings.
+
+use std::path::{Path, PathBuf};
+
+use gpbrdf_core::Source;
+use gpbrdf_core::brdf::materials;
+
+use super::{Event, Opened, Viewer};
+use crate::viewer::state::messages::naming;
+use crate::viewer::state::session::{SavedDocument, Session};
+use crate::viewer::state::settings::Settings;
+use crate::viewer::work::outbox::in_background;
+
+impl Viewer {
+    /// Opens files and sessions; they are read in the background.
+    pub fn open_paths(&mut self, paths: &[PathBuf]) {
+        for path in paths {
+            if let Some(material) = materials().iter().find(|m| !path.exists() && path.as_os_str() == m.name)
+            {
+                self.open_built_in(material.name, None);
+            } else if Session::is_named(path) {
+                match Session::read(path) {
+                    Ok(session) => {
+                        self.restore(session);
+                        self.settings.remember(path);
+                    }
+                    Err(error) => self.context.messages.error(format!("{error:#}")),
+                }
+            } else {
+                self.settings.remember(path);
+                self.read(path.clone(), None);
+            }
+        }
+    }
+
+    /// Reads a file in the background.
+    fn read(&self, path: PathBuf, restore: Option<Box<SavedDocument>>) {
+        let cannot = format!("cannot read \"{}\"", path.display());
+        in_background(&self.outbox.map(Event::Opened), "reader", &cannot, move || {
+            let source = Source::open(&path).map_err(|error| naming(&path, &error))?;
+            Ok(Opened { source: Box::new(source), restore })
+        });
+    }
+
+    /// Opens a built-in material.
+    pub(super) fn open_built_in(&mut self, name: &str, restore: Option<Box<SavedDocument>>) {
+        match Source::built_in(name) {
+            Ok(source) => self.open(Opened { source: Box::new(source), restore }),
+            Err(error) => self.context.messages.error(error.to_string()),
+        }
+    }
+
+    /// Opens a material that has been read.
+    pub(super) fn open(&mut self, opened: Opened) {
+        let document = self.context.documents.add(*opened.source);
+        if let Some(saved) = opened.restore {
+            saved.restore(document);
+        }
+    }
+
+    /// Replaces everything that is open, and how it is shown, by a session.
+    fn restore(&mut self, session: Session) {
+        for id in self.context.documents.iter().map(|d| d.id).collect::<Vec<_>>() {
+            self.remove(id);
+        }
+        let recent = std::mem::take(&mut self.settings.recent);
+        self.settings = Settings { recent, ..session.settings };
+        self.new_zoom = Some(self.settings.zoom);
+        self.restore_panes();
+        for saved in session.documents {
+            match (saved.path.clone(), saved.built_in.clone()) {
+                (Some(path), _) => self.read(path, Some(Box::new(saved))),
+                (None, Some(name)) => self.open_built_in(&name, Some(Box::new(saved))),
+                (None, None) => {
+                    self.context.messages.error(format!("session: \"{}\" has no source", saved.name));
+                }
+            }
+        }
+    }
+
+    /// Hands each pane what it remembered.
+    pub(super) fn restore_panes(&mut self) {
+        for pane in &mut self.panes {
+            let kept = self.settings.panes.get(pane.name()).unwrap_or(&serde_json::Value::Null);
+            if let Err(error) = pane.restore(kept) {
+                let message = format!("settings of the pane \"{}\": {error}", pane.title());
+                self.context.messages.error(message);
+            }
+        }
+    }
+
+    /// Writes what is open to a session file.
+    pub(super) fn save_session(&mut self, path: &Path) {
+        match Session::new(&self.context.documents, self.settings()).write(path) {
+            Ok(()) => {
+                self.settings.remember(path);
+                self.context.messages.note(format!("saved session \"{}\"", path.display()));
+            }
+            Err(error) => self.context.messages.error(format!("{error:#}")),
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! An open material: its source, its truth, the model that is wanted and what has been fitted.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use eframe::egui::Color32;
+use gpbrdf_core::judge::{CellMetrics, ImageMetrics};
+use gpbrdf_core::{Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Rgb, SampleSet, Source};
+
+use crate::job::{ModelSpec, Stage};
+
+/// Names a document for as long as the program runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct DocumentId(pub(crate) u64);
+
+/// What the fitter has found for one request. Later stages fill in what is `None`.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitted {
+    /// A number that no other result has.
+    pub(crate) version: u64,
+    pub(crate) model: Arc<Model>,
+    pub(crate) samples: Arc<SampleSet>,
+    /// Unknown for a model from a file.
+    pub(crate) log_marginal_likelihood: Option<f64>,
+    /// How the search went; `None` for hyper-parameters that were set by hand.
+    pub(crate) report: Option<FitReport>,
+    pub(crate) mean: Arc<BrdfTable>,
+    /// Standard deviation of the latent target of each channel in every cell.
+    pub(crate) sigma: Option<Arc<BrdfTable>>,
+    pub(crate) cells: Option<CellMetrics>,
+    pub(crate) images: Option<ImageMetrics>,
+    /// Seconds to sample, fit and bake the mean.
+    pub(crate) seconds: [f64; 3],
+}
+
+/// The state of the work on a document.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Work {
+    /// There is nothing to do.
+    Idle,
+    /// A request has been made and the fitter has not begun it.
+    Waiting,
+    /// The fitter is in a stage of the request that began at `since`, after so many evaluations of the
+    /// likelihood.
+    Running { stage: Stage, since: Instant, evaluations: usize },
+    /// The user has cancelled it.
+    Cancelled,
+    /// It ended with an error.
+    Failed(String),
+}
+
+/// An open material.
+#[derive(Debug)]
+pub(crate) struct Document {
+    pub(crate) id: DocumentId,
+    pub(crate) name: String,
+    pub(crate) colour: Color32,
+    pub(crate) visible: bool,
+    pub(crate) source: Arc<Source>,
+    /// The source as a table, once there is one.
+    pub(crate) truth: Option<Arc<BrdfTable>>,
+    pub(crate) spec: ModelSpec,
+    /// The model that was last requested from the fitter.
+    pub(crate) requested: Option<ModelSpec>,
+    pub(crate) fitted: Option<Fitted>,
+    /// The hyper-parameters that the last search found: the defaults of the sliders.
+    pub(crate) optimum: Option<Hyper>,
+    pub(crate) work: Work,
+}
+
+/// Colours for lines that colour-blind readers can tell apart: M. Okabe and K. Ito, "Color Universal Design"
+/// (2008).
+const PALETTE: [Color32; 7] = [
+    Color32::from_rgb(0xE6, 0x9F, 0x00),
+    Color32::from_rgb(0x56, 0xB4, 0xE9),
+    Color32::from_rgb(0x00, 0x9E, 0x73),
+    Color32::from_rgb(0xD5, 0x5E, 0x00),
+    Color32::from_rgb(0xCC, 0x79, 0xA7),
+    Color32::from_rgb(0x00, 0x72, 0xB2),
+    Color32::from_rgb(0xF0, 0xE4, 0x42),
+];
+
+impl Document {
+    pub(crate) fn new(id: DocumentId, source: Source) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "a remainder")]
+        let colour = PALETTE[(id.0 % PALETTE.len() as u64) as usize];
+        Self {
+            id,
+            name: source.name.clone(),
+            colour,
+            visible: true,
+            source: Arc::new(source),
+            truth: None,
+            spec: ModelSpec::interactive(),
+            requested: None,
+            fitted: None,
+            optimum: None,
+            work: Work::Idle,
+        }
+    }
+
+    /// Whether the source can be evaluated at any direction, so that predictions can be compared with it:
+    /// scattered samples and models cannot.
+    pub(crate) fn source_is_truth(&self) -> bool {
+        matches!(self.source.content, Content::Table(_) | Content::Function { .. })
+    }
+
+    /// Whether the source is scattered measurements, which are all used.
+    pub(crate) fn is_scattered(&self) -> bool {
+        matches!(self.source.content, Content::Samples(_))
+    }
+
+    /// Whether the source is a model already.
+    pub(crate) fn is_model(&self) -> bool {
+        matches!(self.source.content, Content::Model(_))
+    }
+
+    pub(crate) fn is_busy(&self) -> bool {
+        matches!(self.work, Work::Waiting | Work::Running { .. })
+    }
+
+    /// Whether the model that is wanted has been fitted, or will not be.
+    pub(crate) fn is_fitted(&self) -> bool {
+        match self.work {
+            Work::Failed(_) | Work::Cancelled => true,
+            Work::Idle => self.fitted.is_some() && self.requested.as_ref() == Some(&self.spec),
+            Work::Waiting | Work::Running { .. } => false,
+        }
+    }
+
+    /// The result of this number, unless a newer one has replaced it.
+    pub(crate) fn result_mut(&mut self, version: u64) -> Option<&mut Fitted> {
+        self.fitted.as_mut().filter(|f| f.version == version)
+    }
+
+    /// The truth at a pair of directions: from its table once there is one, from the source until then.
+    pub(crate) fn truth_at(&self, angles: HalfDiff) -> Option<Rgb> {
+        match &self.truth {
+            Some(table) => Some(table.eval_half_diff(angles)),
+            None if self.source_is_truth() => self.source.brdf().ok().map(|brdf| brdf.eval_half_diff(angles)),
+            None => None,
+        }
+    }
+
+    /// Lets the search find the hyper-parameters again.
+    pub(crate) fn optimise(&mut self) {
+        self.spec.hyper = None;
+        self.requested = None;
+    }
+}

@@ -1,0 +1,12 @@
+//! What is drawn. Functions named `*_ui` draw and never wait.
+
+pub(crate) mod layout;
+pub(crate) mod menu;
+pub(crate) mod messages;
+pub(crate) mod navigate;
+pub(crate) mod pane;
+pub(crate) mod panes;
+pub(crate) mod shortcuts;
+pub(crate) mod status;
+pub(crate) mod widgets;
+pub(crate) mod windows;

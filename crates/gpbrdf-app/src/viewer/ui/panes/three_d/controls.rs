@@ -1,0 +1,107 @@
+//! The menus of the 3-D view: which shape is shown from where, and what lights it.
+
+use eframe::egui::Ui;
+
+use super::{Message, ThreeD};
+use crate::viewer::state::look::{Orbit, Shape, SphereLight};
+use crate::viewer::ui::pane::{Order, PaneContext};
+use crate::viewer::ui::widgets::{Number, narrow};
+use crate::viewer::work::dialogs::{Access, Question};
+
+impl ThreeD {
+    /// The shape and the place of the eye.
+    pub(super) fn shape_ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        let mut shapes = vec![Shape::Sphere, Shape::Knot, Shape::RoundedBox];
+        if let Shape::File(_) = &self.look.shape {
+            shapes.push(self.look.shape.clone());
+        }
+        for shape in shapes {
+            if ui.radio(self.look.shape == shape, shape.name()).clicked() {
+                self.look.shape = shape;
+            }
+        }
+        if ui.button("OBJ file…").clicked() {
+            cx.order(Order::Ask(Question {
+                title: "Object",
+                help: "A Wavefront OBJ file.",
+                access: Access::Read { kind: "Wavefront OBJ", endings: &["obj"] },
+                answer: self.outbox.map(Message::OpenObject),
+            }));
+            ui.close();
+        }
+        ui.separator();
+        orbit_ui(ui, &mut self.look.orbit);
+    }
+
+    /// The light, the exposure and the line between truth and prediction.
+    pub(super) fn light_ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        let light = &mut self.look.light;
+        ui.radio_value(&mut light.point, false, format!("Environment: {}", self.map.name));
+        ui.radio_value(&mut light.point, true, "Point light");
+        Number::new("Exposure", -8.0..=8.0, 0.0, "Stops").row_ui(ui, &mut light.exposure);
+        let help = "Where truth ends and prediction begins";
+        narrow_ui(ui, &Number::new("Swipe", 0.0..=1.0, 0.5, help), &mut self.look.swipe);
+        if light.point {
+            place_ui(ui, light);
+        } else {
+            degrees_ui(ui, "Turned", "The environment about the vertical axis", &mut light.yaw);
+            let help = "The environment about the horizontal axis, for the sphere only";
+            degrees_ui(ui, "Tilted", help, &mut light.pitch);
+        }
+        ui.separator();
+        if ui.button("Environment map…").clicked() {
+            cx.order(Order::Ask(Question {
+                title: "Environment",
+                help: "A latitude-longitude map, .hdr or .exr.",
+                access: Access::Read { kind: "Environment maps", endings: &["hdr", "exr"] },
+                answer: self.outbox.map(Message::OpenMap),
+            }));
+            ui.close();
+        }
+        if ui.button("Built-in studio").clicked() {
+            self.use_studio();
+        }
+    }
+}
+
+/// A number in single precision.
+fn narrow_ui(ui: &mut Ui, number: &Number<'_>, value: &mut f32) {
+    let mut shown = f64::from(*value);
+    if number.clone().row_ui(ui, &mut shown) {
+        *value = narrow(shown);
+    }
+}
+
+fn orbit_ui(ui: &mut Ui, orbit: &mut Orbit) {
+    let Orbit { azimuth, elevation, zoom } = Orbit::default();
+    let number = |label, range, default: f32, help| Number::new(label, range, f64::from(default), help);
+    let help = "Of the eye about an object, radians";
+    narrow_ui(ui, &number("Azimuth", -3.15..=3.15, azimuth, help), &mut orbit.azimuth);
+    let help = "Of the eye over an object, radians";
+    narrow_ui(ui, &number("Elevation", -1.5..=1.5, elevation, help), &mut orbit.elevation);
+    narrow_ui(ui, &number("Zoom", 0.3..=6.0, zoom, "How large it is"), &mut orbit.zoom);
+}
+
+/// The place of the point light.
+fn place_ui(ui: &mut Ui, light: &mut SphereLight) {
+    let fallback = SphereLight::default().at;
+    let mut at = light.at;
+    let mut changed = false;
+    for (k, name) in ["Light x", "Light y"].into_iter().enumerate() {
+        let number = Number::new(name, -1.0..=1.0, fallback[k], "Where the light is over the disc");
+        changed |= number.row_ui(ui, &mut at[k]);
+    }
+    if changed {
+        light.place(at);
+    }
+}
+
+/// An angle, which is shown in degrees.
+fn degrees_ui(ui: &mut Ui, label: &str, help: &str, radians: &mut f64) {
+    let mut shown = radians.to_degrees();
+    let mut number = Number::new(label, -180.0..=180.0, 0.0, help);
+    number.suffix = "°";
+    if number.row_ui(ui, &mut shown) {
+        *radians = shown.to_radians();
+    }
+}

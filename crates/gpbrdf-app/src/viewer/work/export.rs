@@ -1,0 +1,148 @@
+//! Pictures and models as files, written by threads of their own.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result};
+use eframe::egui::Context;
+use gpbrdf_core::Rgb;
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::figure::{Picture, Slice, slice_figure, sphere_figure};
+use gpbrdf_core::formats::write_image_exr;
+
+use super::outbox::{Outbox, in_background};
+use super::slices::Truth;
+use super::spheres::SphereImages;
+use crate::viewer::state::document::Document;
+use crate::viewer::state::look::SliceLook;
+
+/// What became of a file: a sentence for the user, or an error.
+pub(crate) type Saved = Result<String, String>;
+
+/// Writes files on a thread of its own and reports how it went.
+fn write(outbox: &Outbox<Saved>, work: impl FnOnce() -> Result<String> + Send + 'static) {
+    in_background(outbox, "writer", "cannot write", || work().map_err(|error| format!("{error:#}")));
+}
+
+/// The path `name.png` with a suffix in place of its extension.
+fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
+    path.with_file_name(format!("{stem}{suffix}"))
+}
+
+fn png_file(path: &Path, picture: &Picture) -> Result<AtomicFile> {
+    let mut file = AtomicFile::create(path)?;
+    picture.write_png(&mut file).with_context(|| format!("cannot write \"{}\"", path.display()))?;
+    Ok(file)
+}
+
+fn exr_file(path: &Path, size: [usize; 2], pixels: &[Rgb]) -> Result<AtomicFile> {
+    let mut file = AtomicFile::create(path)?;
+    write_image_exr(&mut file, size[0], size[1], pixels)
+        .with_context(|| format!("cannot write \"{}\"", path.display()))?;
+    Ok(file)
+}
+
+/// Writes the slices of a material: a figure, and linear values beside it.
+pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox: &Outbox<Saved>) {
+    let Some(fitted) = document.fitted.clone() else {
+        outbox.send(Err("nothing to export: no model has been fitted yet".to_owned()));
+        return;
+    };
+    let truth = Truth::of(document);
+    let (name, path) = (document.name.clone(), path.with_extension("png"));
+    let options = look.options();
+    write(outbox, move || {
+        let truth = truth.as_ref().and_then(Truth::brdf);
+        let picture = slice_figure(&name, truth, fitted.mean.as_ref(), &options)?;
+        let mut files = vec![png_file(&path, &picture)?];
+        let size = [options.size; 2];
+        let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
+            files.push(exr_file(&beside(&path, suffix), size, pixels)?);
+            Ok(())
+        };
+        let mean = Slice::new(fitted.mean.as_ref(), &options);
+        add("-prediction.exr", mean.values())?;
+        if let Some(truth) = truth {
+            let truth = Slice::new(truth, &options);
+            add("-truth.exr", truth.values())?;
+            let difference = mean.log_difference(&truth)?;
+            add("-difference.exr", &difference.into_iter().map(|gap| [gap; 3]).collect::<Vec<_>>())?;
+        }
+        if let Some(sigma) = &fitted.sigma {
+            add("-sigma.exr", Slice::new(sigma.as_ref(), &options).values())?;
+        }
+        AtomicFile::commit_all(files)?;
+        Ok(format!("wrote \"{}\" and the linear slices beside it", path.display()))
+    });
+}
+
+/// Writes spheres as they are shown: a figure, and linear pictures beside it.
+pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &Outbox<Saved>) {
+    let (truth, prediction) = (images.linear_truth.clone(), images.linear_mean.clone());
+    let (name, path, psnr) = (name.to_owned(), path.with_extension("png"), images.psnr);
+    write(outbox, move || {
+        let picture = sphere_figure(&name, truth.as_ref(), &prediction, psnr)?;
+        let mut files = vec![png_file(&path, &picture)?];
+        let linear = truth.iter().map(|image| ("truth", image)).chain([("prediction", &prediction)]);
+        for (which, image) in linear {
+            let pixels: Vec<Rgb> = image.pixels().iter().map(|p| p.map(f64::from)).collect();
+            let target = beside(&path, &format!("-{which}.exr"));
+            files.push(exr_file(&target, [image.width(), image.height()], &pixels)?);
+        }
+        AtomicFile::commit_all(files)?;
+        Ok(format!("wrote \"{}\" and the linear pictures beside it", path.display()))
+    });
+}
+
+/// Writes the model of a material.
+pub(crate) fn model(document: &Document, path: &Path, outbox: &Outbox<Saved>) {
+    let Some(model) = document.fitted.as_ref().map(|fitted| Arc::clone(&fitted.model)) else {
+        outbox.send(Err("nothing to save: no model has been fitted yet".to_owned()));
+        return;
+    };
+    let path = path.with_extension("safetensors");
+    write(outbox, move || {
+        let mut file = AtomicFile::create(&path)?;
+        std::io::Write::write_all(&mut file, &model.to_bytes()?)
+            .with_context(|| format!("cannot write \"{}\"", path.display()))?;
+        file.commit()?;
+        Ok(format!("saved model \"{}\"", path.display()))
+    });
+}
+
+/// Writes a picture of the window as PNG and EXR to a folder, to the current one if `folder` is `None`.
+pub(crate) fn screenshot(ctx: &Context, folder: Option<PathBuf>, outbox: &Outbox<Saved>) {
+    let outbox = outbox.clone();
+    ctx.request_screenshot(move |image| {
+        write(&outbox, move || {
+            let [width, height] = image.size;
+            let folder =
+                folder.map_or_else(std::env::current_dir, Ok).context("cannot find the current folder")?;
+            let path = free_name(&folder, "gpbrdf-screenshot")?;
+            let picture = Picture::from_fn(width, height, |x, y| {
+                let [r, g, b, _] = image.pixels[y * width + x].to_array();
+                [r, g, b]
+            });
+            // The inverse of the curve of IEC 61966-2-1.
+            let linear = |x: u8| {
+                let x = f64::from(x) / 255.0;
+                if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+            };
+            let pixels: Vec<Rgb> = picture.pixels().iter().map(|p| p.map(linear)).collect();
+            let files = vec![
+                png_file(&path, &picture)?,
+                exr_file(&path.with_extension("exr"), [width, height], &pixels)?,
+            ];
+            AtomicFile::commit_all(files)?;
+            Ok(format!("wrote \"{}\" and its EXR", path.display()))
+        });
+    });
+}
+
+/// A path in a folder that no file has yet.
+fn free_name(folder: &Path, stem: &str) -> Result<PathBuf> {
+    let mut names = (1..10_000).map(|i| folder.join(format!("{stem}-{i}.png")));
+    let free = names.find(|p| !p.exists() && !p.with_extension("exr").exists());
+    free.with_context(|| format!("too many screenshots in \"{}\"", folder.display()))
+}

@@ -1,0 +1,13 @@
+//! From an object, a light and materials to a picture.
+
+pub(crate) mod camera;
+pub(crate) mod colour;
+pub(crate) mod display;
+pub(crate) mod gbuffer;
+pub(crate) mod light;
+pub(crate) mod mesh;
+pub(crate) mod obj;
+pub(crate) mod renderer;
+pub(crate) mod sampler;
+pub(crate) mod shade;
+pub(crate) mod twin;
