@@ -33,11 +33,12 @@
 //!   is itself a [`Brdf`], and is saved and loaded bit for bit; [`Baked`] fills all 1,458,000 cells.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
-//! All features are on by default. Without them a program that loads, evaluates and bakes models builds a tree of 54
-//! crates; each feature adds what its name says:
+//! All features are on by default. Without them a program that loads, evaluates and bakes models builds a tree of
+//! 54 crates; each feature adds what its name says:
 //!
-//! - `fit` makes models: [`fit`], [`condition`], [`compress`] and what they are made of. It brings argmin and faer, and faer
-//!   then computes predictions, too: their rounding differs, and the first variance of a large dense model is there sooner.
+//! - `fit` makes models: [`fit`], [`condition`], [`compress`] and what they are made of. It brings argmin and faer.
+//!   faer then computes predictions, too: their rounding differs from nalgebra's, and the first variance of a large
+//!   dense model is there sooner.
 //! - `formats` reads and writes measurements, tables and environment maps: [`formats`], [`Source`].
 //! - `figures` draws slices, spheres and their captions: [`figure`].
 //!

@@ -1,5 +1,6 @@
-//! Models that are loaded from files written by hand, against the posterior written out with dense matrices. The tests run
-//! with every set of features: with `fit` faer predicts, without it nalgebra.
+//! Models that are loaded from files written by hand, against the posterior written out with dense matrices.
+//!
+//! The tests run with every set of features: with `fit` faer predicts, without it nalgebra.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -196,8 +197,8 @@ fn a_loaded_compressed_table_is_the_posterior_written_out() {
                 v.iter().flat_map(|&v| phi.iter().map(move |&phi| [u, v, phi])).collect::<Vec<_>>()
             })
             .collect();
-        // All of them have a half of their own.
-        let values: Vec<f64> = (0..24).map(|i| f64::from((i * 7 + k as u32) % 13) / 8.0 - 0.75).collect();
+        // Every value is exact in half precision.
+        let values: Vec<f64> = (0..24).map(|i| ((i * 7 + k) % 13) as f64 / 8.0 - 0.75).collect();
         tensors.add_half(&format!("{k}.values"), &shape, &values);
         let n = nodes.len();
         let covariance = DMatrix::from_fn(n, n, |i, j| product_kernel(&lattice.kernels, nodes[i], nodes[j]));

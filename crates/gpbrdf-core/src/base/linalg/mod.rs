@@ -1,10 +1,11 @@
-//! The linear algebra of small dense matrices that predictions need: products, eigenvectors and Cholesky factors.
+//! The linear algebra of small dense matrices that predictions need: products, eigenvectors, Cholesky factors.
 //!
-//! With the feature `fit` faer computes it, whose blocked and parallel algorithms a search for hyper-parameters repeats
-//! hundreds of times. Without it nalgebra does, which is in the tree for its vectors anyway: no further crate is built, and
-//! a large dense model takes longer to factorise before its first variance. Both backends offer the same names.
+//! With the feature `fit` faer computes it, whose blocked and parallel algorithms pay where a search for
+//! hyper-parameters repeats them hundreds of times. Without it nalgebra does, which is in the tree for its vectors
+//! anyway; only the first variance of a large dense model is slower for it. Both backends offer the same names.
 //!
-//! Matrices in slices are column-major. Cholesky factors are `n x n` and only their lower triangle is written or read.
+//! Matrices in slices are column-major. Cholesky factors are `n x n`, and only their lower triangle is written or
+//! read.
 
 #[cfg(feature = "fit")]
 mod with_faer;

@@ -40,7 +40,8 @@ pub(crate) fn product_into_slice(out: &mut [f64], a: View<'_>, b: View<'_>) {
     matmul(out, Accum::Replace, a, b, 1.0, Par::Seq);
 }
 
-/// Eigenvalues of a symmetric matrix, and its eigenvectors as columns, in the calling thread; `None` where there are none.
+/// Eigenvalues of a symmetric matrix, and its eigenvectors as columns, in the calling thread; `None` where there
+/// are none.
 pub(crate) fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     let n = matrix.nrows();
     let mut vectors = Mat::zeros(n, n);
@@ -58,7 +59,8 @@ pub(crate) fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     Some((values.column_vector().iter().copied().collect(), vectors))
 }
 
-/// Replaces the lower triangle of an `n x n` matrix by its Cholesky factor, in parallel; false where a pivot is not positive.
+/// Replaces the lower triangle of an `n x n` matrix by its Cholesky factor, in parallel; false where a pivot is not
+/// positive.
 pub(crate) fn factorize(matrix: &mut [f64], n: usize) -> bool {
     let par = Par::rayon(0);
     // A fifth faster at n = 4096 than faer's own choice of 256.
@@ -77,8 +79,8 @@ const SOLVE_ROWS: usize = 256;
 
 /// `(L L^T)^-1 y` for every column of `y`, in place.
 ///
-/// For few columns this is bound by reading the factor, so each panel's update is shared among the threads; the sums
-/// run in one order whatever their number.
+/// For few columns this is bound by reading the factor, so each panel's update is shared among the threads; the
+/// sums run in one order whatever their number.
 pub(crate) fn solve(factor: &[f64], n: usize, y: &mut [f64]) {
     let factor = MatRef::from_column_major_slice(factor, n, n);
     let columns = y.len() / n;

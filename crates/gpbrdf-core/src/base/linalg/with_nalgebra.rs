@@ -93,8 +93,8 @@ pub(crate) fn symmetric_eigen(matrix: &Matrix) -> Option<(Vec<f64>, Matrix)> {
     values.iter().all(|x| x.is_finite()).then_some((values, eigen.eigenvectors))
 }
 
-/// Replaces the lower triangle of an `n x n` matrix by its Cholesky factor; false where a pivot is not positive. Takes a
-/// second matrix while it runs.
+/// Replaces the lower triangle of an `n x n` matrix by its Cholesky factor; false where a pivot is not positive.
+/// It takes the memory of a second matrix while it runs.
 pub(crate) fn factorize(matrix: &mut [f64], n: usize) -> bool {
     let Some(factor) = Cholesky::new(DMatrix::from_column_slice(n, n, matrix)) else { return false };
     matrix.copy_from_slice(factor.unpack_dirty().as_slice());

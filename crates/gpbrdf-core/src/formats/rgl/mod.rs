@@ -318,7 +318,7 @@ impl RglBrdf {
 
 impl Brdf for RglBrdf {
     /// `f(wi, wo)`. As measured, it obeys reciprocity up to noise only; wrap it in
-    /// [`Reciprocal`](crate::Reciprocal) where that matters. Finite for all directions; `cos(theta_o)` under
+    /// [`Reciprocal`](crate::brdf::Reciprocal) where that matters. Finite for all directions; `cos(theta_o)` under
     /// 1e-6 counts as 1e-6.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
         // Written so that NaN gives zero.

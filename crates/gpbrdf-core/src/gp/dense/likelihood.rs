@@ -40,8 +40,8 @@ impl DenseEvaluator {
     /// Takes `x`, `n` rows of `dimension` coordinates, and `y`, `n` rows of `channels` targets of zero mean.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for sizes that do not agree, no samples, or values that are not finite;
-    /// [`Error::TooLarge`] where the matrix does not fit in memory.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for sizes that do not agree, no samples, or values
+    /// that are not finite; [`Error::TooLarge`](crate::Error::TooLarge) where the matrix does not fit in memory.
     pub fn new(x: &[f64], dimension: usize, y: &[f64], channels: usize) -> Result<Self> {
         let y = check_samples(x, dimension, y, channels)?;
         let n = y.len() / channels;
@@ -55,7 +55,7 @@ impl DenseEvaluator {
     /// Cost: `n^2 / 2` kernel evaluations, in parallel.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for an invalid kernel or noise.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an invalid kernel or noise.
     pub fn covariance(&mut self, kernel: &Kernel, noise_variance: f64) -> Result<&[f64]> {
         check_kernel(kernel, self.dimension, noise_variance)?;
         let points = Points::new(&self.x, &kernel.metric);
@@ -68,8 +68,8 @@ impl DenseEvaluator {
     /// Cost: `n^3 / 6` multiply-adds.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for an invalid kernel or noise, [`Error::NotPositiveDefinite`] where no jitter
-    /// helps.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an invalid kernel or noise,
+    /// [`Error::NotPositiveDefinite`](crate::Error::NotPositiveDefinite) where no jitter helps.
     pub fn evaluate(&mut self, kernel: &Kernel, noise_variance: f64) -> Result<DenseLikelihood> {
         self.factorized(kernel, noise_variance).map(|factorized| factorized.likelihood)
     }
