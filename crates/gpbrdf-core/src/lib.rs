@@ -3,8 +3,12 @@
 //! From a file or a built-in material to a table of mean and sigma:
 //!
 //! ```
+//! # #[cfg(all(feature = "fit", feature = "formats"))]
 //! use gpbrdf_core::{Baked, FitOptions, LatticeLayout, Layout, Source, Symmetry, fit};
 //!
+//! # #[cfg(not(all(feature = "fit", feature = "formats")))]
+//! # fn main() {}
+//! # #[cfg(all(feature = "fit", feature = "formats"))]
 //! # fn main() -> gpbrdf_core::Result<()> {
 //! let source = Source::built_in("cherry-235")?; // or Source::open(path)
 //! let layout = LatticeLayout::with_samples(500, Symmetry::Bilateral)?;
@@ -33,8 +37,14 @@
 //!   values in all 1,458,000 cells of a table.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
-//! The features `formats` and `figures` are on by default. Without them the crate still loads and evaluates
-//! models, and is built without the dependencies that read files and draw pictures and fonts.
+//! All features are on by default. Without them a program that loads, evaluates and bakes models builds a tree of
+//! 54 crates; each feature adds what its name says:
+//!
+//! - `fit` makes models: [`fit`], [`condition`], [`compress`] and what they are made of. It brings argmin and faer.
+//!   faer then computes predictions, too: their rounding differs from nalgebra's, and the first variance of a large
+//!   dense model is there sooner.
+//! - `formats` reads and writes measurements, tables and environment maps: [`formats`], [`Source`].
+//! - `figures` draws slices, spheres and their captions: [`figure`].
 //!
 //! Results do not depend on the number of threads. "The paper" is Hao, Liu and Weng, "A BRDF Representing
 //! Method Based on Gaussian Process"; equation numbers without another source refer to it.
@@ -61,13 +71,14 @@ pub use base::{Error, Result};
 pub use brdf::{Brdf, BrdfTable, HalfDiff, Rgb, SigmaTable};
 #[cfg(feature = "formats")]
 pub use formats::{Content, Source};
-pub use gp::{FitReport, Hyper, Noise, Observer, Solver};
+#[cfg(feature = "fit")]
+pub use gp::{FitReport, Noise, Observer};
+pub use gp::{Hyper, Solver};
 pub use judge::{Environment, Metrics};
 pub use kernel::Shape;
-pub use model::{
-    Baked, CompressOptions, Fit, FitOptions, InducingSize, IntervalOf, Intervals, Model, Prediction,
-    bake_mean, bake_sigma, compress, condition, fit,
-};
+pub use model::{Baked, IntervalOf, Intervals, Model, Prediction, bake_mean, bake_sigma};
+#[cfg(feature = "fit")]
+pub use model::{CompressOptions, Fit, FitOptions, InducingSize, compress, condition, fit};
 pub use sample::{
     LatticeLayout, Layout, MeanFunction, Provenance, Sample, SampleSet, Symmetry, Transform, detect_symmetry,
 };

@@ -357,6 +357,7 @@ mod tests {
         );
     }
 
+    #[cfg(feature = "formats")]
     #[test]
     fn published_fits_equal_the_table_of_parameters() {
         let Some(folder) = crate::test_data::data_dir() else { return };

@@ -70,6 +70,7 @@ impl Transform {
     }
 
     /// `df / dg` at the target `g`.
+    #[cfg(feature = "fit")]
     pub(crate) fn slope_of_inverse(self, g: f64) -> f64 {
         match self {
             Self::Identity => 1.0,
