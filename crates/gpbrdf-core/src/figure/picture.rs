@@ -6,6 +6,7 @@ use std::path::Path;
 use font8x8::legacy::{BASIC_LEGACY, GREEK_LEGACY, LATIN_LEGACY};
 use image::ImageEncoder as _;
 
+use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 
@@ -119,10 +120,11 @@ impl Picture {
     ///
     /// # Errors
     /// [`Error::Io`] when the file cannot be written.
-    pub fn save_png(&self, path: &Path) -> Result<()> {
-        std::fs::File::create(path)
-            .and_then(|file| self.write_png(&mut std::io::BufWriter::new(file)))
-            .map_err(|source| Error::write(path, source))
+    pub fn save_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let mut file = AtomicFile::create(path)?;
+        self.write_png(&mut file).map_err(|source| Error::write(path, source))?;
+        file.commit()
     }
 
     fn set(&mut self, x: i64, y: i64, colour: Rgb8) {

@@ -9,6 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 use crate::brdf::angles::GRAZING_COSINE;
 use crate::brdf::angles::HalfDiff;
@@ -70,24 +71,28 @@ pub fn render_point(tables: &[&BrdfTable], size: usize) -> Vec<Image> {
 }
 
 fn render(tables: &[&BrdfTable], lights: &[DistantLight], size: usize) -> Vec<Image> {
+    // Without cancellation there is no error.
     render_sphere(tables, lights, size, &|| false).unwrap_or_default()
 }
 
 /// The sphere of each table under any lights, computed like [`render_env`]. `cancelled` is called once per
-/// tile; the result is `None` as soon as it returns true.
+/// tile.
+///
+/// # Errors
+/// [`Error::Cancelled`] as soon as `cancelled` returns true.
 pub fn render_sphere(
     tables: &[&BrdfTable],
     lights: &[DistantLight],
     size: usize,
     cancelled: &(dyn Fn() -> bool + Sync),
-) -> Option<Vec<Image>> {
+) -> Result<Vec<Image>> {
     let center = |i: usize| 2.0 * (i as f64 + 0.5) / size as f64 - 1.0;
     let tiles = size.div_ceil(TILE);
-    let shaded: Option<Vec<Shaded>> = (0..tiles * tiles)
+    let shaded: Result<Vec<Shaded>> = (0..tiles * tiles)
         .into_par_iter()
         .map(|tile| {
             if cancelled() {
-                return None;
+                return Err(Error::Cancelled);
             }
             let (left, top) = (tile % tiles * TILE, tile / tiles * TILE);
             let mut pixels = Vec::with_capacity(TILE * TILE);
@@ -97,7 +102,7 @@ pub fn render_sphere(
                     pixels.extend(frame.map(|frame| (row * size + column, frame)));
                 }
             }
-            Some(shade(tables, lights, &pixels))
+            Ok(shade(tables, lights, &pixels))
         })
         .collect();
     let shaded = shaded?;
@@ -114,7 +119,7 @@ pub fn render_sphere(
         }
         Image { width: size, height: size, pixels, mask: mask.clone() }
     });
-    Some(images.collect())
+    Ok(images.collect())
 }
 
 /// The local frame of a point to be shaded: the normal is `+z`, and the viewer is in the plane of `x` and

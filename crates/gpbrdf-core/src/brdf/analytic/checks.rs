@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Rotation3, Vector3};
 
+use crate::base::random::SplitMix64;
 use crate::brdf::angles::{HalfDiff, direction};
 use crate::brdf::{Brdf, Rgb};
 
@@ -36,16 +37,10 @@ pub(crate) fn assert_pinned(brdf: &impl Brdf, expected: [Rgb; 4]) {
     }
 }
 
-/// A seeded stream of numbers in `[0, 1)` (splitmix64).
+/// A seeded stream of numbers in `[0, 1)`.
 fn uniform(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
+    let mut random = SplitMix64::new(seed);
+    move || random.next_unit()
 }
 
 /// Random pairs above the horizon, uniform in solid angle.

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 
@@ -27,10 +28,18 @@ pub struct NeuralBrdf {
 
 impl NeuralBrdf {
     /// A network with these [`NEURAL_FLOATS`] weights: `W1[6][21]`, `b1[21]`, `W2[21][21]`, `b2[21]`,
-    /// `W3[21][3]`, `b3[3]`. `None` if their number is another or one of them is not finite.
-    #[must_use]
-    pub fn new(weights: Vec<f64>) -> Option<Self> {
-        (weights.len() == NEURAL_FLOATS && weights.iter().all(|w| w.is_finite())).then_some(Self { weights })
+    /// `W3[21][3]`, `b3[3]`.
+    ///
+    /// # Errors
+    /// Another number of weights, or one that is not finite.
+    pub fn new(weights: Vec<f64>) -> Result<Self> {
+        if weights.len() != NEURAL_FLOATS {
+            return Err(Error::argument("weights", NEURAL_FLOATS.to_string(), weights.len()));
+        }
+        match weights.iter().find(|weight| !weight.is_finite()) {
+            None => Ok(Self { weights }),
+            Some(weight) => Err(Error::argument("weights", "finite numbers", weight)),
+        }
     }
 }
 
@@ -94,8 +103,8 @@ mod tests {
         let (wi, wo) = angles.to_directions();
         assert!((brdf.eval(&wi, &wo)[1] - expected).abs() < 1e-9);
         assert_eq!(brdf.eval(&-wi, &wo), [0.0; 3]);
-        assert!(NeuralBrdf::new(weights[1..].to_vec()).is_none());
+        assert!(NeuralBrdf::new(weights[1..].to_vec()).is_err());
         weights[0] = f64::NAN;
-        assert!(NeuralBrdf::new(weights).is_none());
+        assert!(NeuralBrdf::new(weights).is_err());
     }
 }

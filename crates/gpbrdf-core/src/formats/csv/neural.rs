@@ -59,7 +59,7 @@ pub fn read_neural_csv(path: &Path) -> Result<Vec<(String, NeuralBrdf)>> {
             weights.push(value.ok_or_else(said)?);
         }
         let name = record.get(material).unwrap_or("").to_owned();
-        fits.extend(NeuralBrdf::new(weights).map(|brdf| (name, brdf)));
+        fits.push((name, NeuralBrdf::new(weights)?));
     }
     if fits.is_empty() {
         return Err(bad("at least one row of weights".into(), "none".into()));
