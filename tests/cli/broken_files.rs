@@ -184,7 +184,8 @@ fn damaged_exr_files() {
     let message = cli.fails(&["bake", "t.exr", "-o", "new"]);
     assert!(
         message.starts_with(
-            "OpenEXR file \"t.exr\": expected a part with the floating-point channels R, G and B, found channels B, G, X"
+            "OpenEXR file \"t.exr\": expected a part with the floating-point channels R, G and B, \
+             found channels B, G, X"
         ),
         "{message}"
     );
@@ -199,7 +200,8 @@ fn damaged_samples() {
         ("1,2,3,4,5,1e400,7\n", "a finite number in column `g` on line 2, found \"1e400\""),
         (
             "1,2,90,4,5,6,7\n",
-            "an angle of from 0 to under 90 (above the horizon) degrees in column `theta_o` on line 2, found 90 degrees",
+            "an angle of from 0 to under 90 (above the horizon) degrees in column `theta_o` on line 2, \
+             found 90 degrees",
         ),
         ("1,2,3,4,-5,6,7\n", "a value of at least 0 in column `r` on line 2, found -5"),
         ("1,2,3\n", "a finite number in column `phi_o` on line 2, found only 3 columns"),

@@ -67,7 +67,8 @@ fn values_out_of_range_are_refused() {
         ),
         (
             &["--lattice", "4x4x4", "--kernel", "matern52+cubic"],
-            "--kernel: expected shapes out of se, rq, matern12, matern32, matern52, matern joined by +, found \"cubic\"",
+            "--kernel: expected shapes out of se, rq, matern12, matern32, matern52, matern joined by +, \
+             found \"cubic\"",
         ),
         (
             &["--layout", "random", "--samples", "0"],

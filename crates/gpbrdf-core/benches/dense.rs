@@ -1,4 +1,5 @@
-//! The dense Gaussian process at n = 4096: assembly, and one step of an optimisation.
+//! Benchmark of the dense Gaussian process with 4096 samples: assembly of the covariance matrix, and one step
+//! of an optimisation.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::hint::black_box;
@@ -10,7 +11,7 @@ use gpbrdf_core::kernel::Kernel;
 
 const N: usize = 4096;
 
-/// Points of an additive recurrence in the unit cube, and three channels of smooth targets.
+/// Points of an additive recurrence in the unit cube, and smooth targets in three channels.
 fn samples() -> (Vec<f64>, Vec<f64>) {
     let fraction = |i: usize, ratio: f64| ((i + 1) as f64 * ratio).fract();
     let x: Vec<f64> = (0..N)

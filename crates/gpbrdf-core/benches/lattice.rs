@@ -1,5 +1,5 @@
-//! The lattice process at 64 x 32 x 18 = 36,864 nodes, RGB: fit with all hyper-parameters optimised, mean and sigma of the
-//! table.
+//! Benchmark of the lattice process with 64 x 32 x 18 = 36,864 nodes and three channels: sampling, a fit that
+//! optimises all hyper-parameters, and baking the table's mean and sigma.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::hint::black_box;
@@ -10,7 +10,7 @@ use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Source, bake_mean, bake_sig
 fn lattice(c: &mut Criterion) {
     let mut group = c.benchmark_group("lattice_36864_rgb");
     group.sample_size(20);
-    // A measurement where one is given, else a built-in material.
+    // The file named by the environment variable where it is set, else a built-in material.
     let source =
         std::env::var_os("GPBRDF_BENCH_INPUT").map_or_else(|| Source::built_in("cherry-235"), Source::open);
     let Ok(source) = source else {

@@ -1,7 +1,8 @@
-//! Fits a model to scattered measurements and checks its intervals with measurements that it has not seen:
-//! `cargo run --release -p gpbrdf-core --example fit_csv -- [SAMPLES.csv [MODEL.safetensors]]`.
+//! Fits a model to scattered measurements and checks its intervals against measurements that were kept back
+//! from the fit: `cargo run --release -p gpbrdf-core --example fit_csv -- [SAMPLES.csv [MODEL.safetensors]]`.
 //!
-//! Without arguments it writes such a file itself, from a built-in material, into a temporary folder.
+//! Without arguments the example measures a built-in material and writes such a file itself, into a temporary
+//! folder.
 #![expect(clippy::print_stdout, reason = "an example reports to a terminal")]
 
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ use gpbrdf_core::{FitOptions, IntervalOf, Layout, Model, SampleSet, Source, fit}
 
 type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
-/// Measurements in the file that the example writes.
+/// Number of measurements in the file that the example writes.
 const COUNT: usize = 500;
 
 /// One measurement out of this many is kept back from the fit.
@@ -30,7 +31,8 @@ fn main() -> Result {
     }
 }
 
-/// A file as a goniometer would write it: one direction pair and its red, green and blue values per line.
+/// Writes a file like that of a goniometer: each line holds a pair of directions and its red, green and blue
+/// values.
 fn write_measurements(file: &Path) -> Result {
     let samples = Source::built_in("red-plastic")?.measure(&Layout::Random { count: COUNT, seed: 1 })?;
     write_samples_csv(file, &samples)?;

@@ -1,5 +1,5 @@
 //! What holds for every model, with random samples, kernels and directions.
-#![cfg(feature = "formats")]
+#![cfg(all(feature = "fit", feature = "formats"))]
 #![allow(clippy::unwrap_used, reason = "tests state exact expectations")]
 
 use std::f64::consts::{PI, TAU};

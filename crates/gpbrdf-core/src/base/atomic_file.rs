@@ -9,28 +9,28 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::base::error::{Error, Result};
 
-/// The temporary files that exist now.
+/// Paths of the temporary files that exist now.
 static PENDING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Tells apart the temporary files of one process.
+/// Number of the next temporary file; it keeps the names of this process apart.
 static COUNTER: AtomicU64 = AtomicU64::new(0);
 
-/// Large enough that a table's worth of small writes costs few system calls.
+/// Size of a file's buffer: large enough that a table's many small writes cost few system calls.
 const BUFFER_BYTES: usize = 1 << 18;
 
 fn pending() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // A panic elsewhere leaves the set usable: every change to it is one insertion or removal.
+    // A panic elsewhere leaves the set usable: every change to it is a single insertion or removal.
     PENDING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A buffered file that takes its name only when it is complete.
 ///
-/// What is written goes to a temporary file in the folder of the target; [`AtomicFile::commit`] renames it.
-/// Dropped before that, the temporary file is removed and an existing target stays as it was. The result has
-/// the permissions of a normally created file; a target that is a symbolic link stays one, and the file it
-/// points to is replaced.
+/// The content goes to a temporary file in the folder of the target; [`AtomicFile::commit`] renames it. If
+/// the value is dropped before that, the temporary file is removed and an existing target stays as it was.
+/// The result has the permissions of a normally created file. If the target is a symbolic link, the link
+/// stays and the file that it points to is replaced.
 ///
-/// Nothing is forced to the disk: a crash of the process leaves no partial file, a power cut may.
+/// The data is not forced to the disk: a crash of the process leaves no partial file, but a power cut may.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
@@ -40,7 +40,7 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Starts a file that will be called `path`.
+    /// Starts a file that will be called `path` once it is committed.
     ///
     /// # Errors
     /// [`Error::Io`] when `path` is a directory or a device, or its folder does not exist or cannot be
@@ -53,7 +53,7 @@ impl AtomicFile {
             Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
             _ => PathBuf::from("."),
         };
-        // Held over the creation, so that no temporary file exists unregistered.
+        // The lock is held during the creation, so that no temporary file exists without being registered.
         let mut pending = pending();
         loop {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
@@ -64,7 +64,7 @@ impl AtomicFile {
                     let file = BufWriter::with_capacity(BUFFER_BYTES, file);
                     return Ok(Self { target, temporary, file, committed: false });
                 }
-                // Left over by a killed process with the same id.
+                // A killed process with the same id left this file behind; the next number is tried.
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(failed(error)),
             }
@@ -80,7 +80,7 @@ impl AtomicFile {
     /// Writes `bytes` to `path`, whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Io`] when the file cannot be written; nothing is left then.
+    /// [`Error::Io`] when the file cannot be written; no part of it is left then.
     pub fn write(path: impl AsRef<Path>, bytes: &[u8]) -> Result<()> {
         let mut file = Self::create(path.as_ref())?;
         file.write_all(bytes).map_err(|source| Error::write(path.as_ref(), source))?;
@@ -90,25 +90,27 @@ impl AtomicFile {
     /// Flushes the file and gives it its name.
     ///
     /// # Errors
-    /// [`Error::Io`] when the last bytes cannot be written or the file cannot be renamed; nothing is left then.
+    /// [`Error::Io`] when the last bytes cannot be written or the file cannot be renamed; no part of it is
+    /// left then.
     pub fn commit(self) -> Result<()> {
         Self::commit_all(vec![self])
     }
 
-    /// Flushes all files, then gives all of them their names: an error while writing leaves none of them.
+    /// Flushes all files, then renames all of them. If one cannot be flushed, none is renamed.
     ///
     /// # Errors
-    /// [`Error::Io`] as for [`AtomicFile::commit`]. When a rename fails, files before it in the list have
-    /// their names already.
+    /// [`Error::Io`] as for [`AtomicFile::commit`]. When a rename fails, the files before it in the list
+    /// already have their names.
     pub fn commit_all(mut files: Vec<Self>) -> Result<()> {
         for file in &mut files {
             file.file.flush().map_err(|source| Error::write(&file.target, source))?;
-            // The folder may have appeared in the meantime; a rename would replace an empty one on no system.
+            // A folder may have taken the name in the meantime. Its rename would fail, but only after others
+            // were done.
             if file.target.is_dir() {
                 return Err(Error::write(&file.target, io::ErrorKind::IsADirectory.into()));
             }
         }
-        // Held over all renames: an interruption finds none or all of them done.
+        // The lock is held over all renames, so that an interruption finds either none or all of them done.
         let mut pending = pending();
         let outcome = files.iter_mut().try_for_each(|file| {
             fs::rename(&file.temporary, &file.target).map_err(|source| Error::write(&file.target, source))?;
@@ -141,21 +143,21 @@ impl Drop for AtomicFile {
     fn drop(&mut self) {
         if !self.committed {
             let mut pending = pending();
-            // Nothing can be done about a failure here.
+            // A failure cannot be reported from here.
             let _ = fs::remove_file(&self.temporary);
             pending.remove(&self.temporary);
         }
     }
 }
 
-/// Holds back every [`AtomicFile`] of the process; see [`remove_pending`].
+/// Blocks every [`AtomicFile`] of the process while it exists; see [`remove_pending`].
 #[derive(Debug)]
 #[must_use = "files can be created and committed again once this is dropped"]
 pub struct PendingRemoved {
     _guard: MutexGuard<'static, BTreeSet<PathBuf>>,
 }
 
-/// Removes the temporary files of all uncommitted [`AtomicFile`]s, for a handler of Ctrl-C to call before it
+/// Removes the temporary files of all uncommitted [`AtomicFile`]s. A handler of Ctrl-C calls this before it
 /// ends the process.
 ///
 /// Until the returned value is dropped, other threads that create, commit or drop an [`AtomicFile`] wait, so
@@ -168,7 +170,7 @@ pub fn remove_pending() -> PendingRemoved {
     PendingRemoved { _guard: pending }
 }
 
-/// `path` with a final symbolic link followed; an error unless a regular file can stand there.
+/// Follows a final symbolic link of `path`. Fails if something other than a regular file has that name.
 fn resolve(path: &Path) -> io::Result<PathBuf> {
     let Ok(metadata) = fs::symlink_metadata(path) else {
         if path.file_name().is_none() {
@@ -179,7 +181,7 @@ fn resolve(path: &Path) -> io::Result<PathBuf> {
     let target = if metadata.is_symlink() {
         match fs::canonicalize(path) {
             Ok(target) => target,
-            // A link to nothing yet.
+            // The link points to a file that does not exist yet.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 let link = fs::read_link(path)?;
                 return Ok(path.parent().map_or(link.clone(), |folder| folder.join(&link)));
@@ -212,7 +214,7 @@ mod tests {
         names
     }
 
-    // One test, since `remove_pending` reaches every file of the process.
+    // This is one test, since `remove_pending` acts on every file of the process.
     #[test]
     fn files_appear_whole_or_not_at_all() {
         let folder = tempfile::tempdir().unwrap();
@@ -245,7 +247,7 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.txt", "b.txt"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), "both");
 
-        // A target that turns into a folder stops all of them.
+        // If one target has become a folder, none of the files is committed.
         let third = folder.path().join("c");
         let both = vec![
             AtomicFile::create(folder.path().join("d.txt")).unwrap(),

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-/// What can go wrong in `gpbrdf-core`. Every variant names what was expected and
-/// what was found; variants about a file name the file.
+/// What can go wrong in `gpbrdf-core`. Variants say what was expected and what was found; those about a file
+/// also name the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -17,29 +17,29 @@ pub enum Error {
         /// The operating system's answer.
         source: std::io::Error,
     },
-    /// A file's content is not what its format asks for.
+    /// The content of a file is not what its format requires.
     #[error("{format} file \"{}\": expected {expected}, found {found}", path.display())]
     Format {
         /// The format, for example `MERL`.
         format: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the format asks for.
+        /// What the format requires.
         expected: String,
         /// What the file holds.
         found: String,
     },
-    /// A file is of no kind that this crate reads.
+    /// A file has none of the formats that this crate reads.
     #[error("\"{}\": expected {expected}, found {found}", path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
-        /// The kinds that can be read.
+        /// The formats that can be read.
         expected: String,
         /// A description of the content.
         found: String,
     },
-    /// A name that stands for nothing built in.
+    /// A name belongs to nothing that is built in.
     #[error("no {kind} is called \"{name}\": expected one of {known}")]
     UnknownName {
         /// The kind of thing that was named, for example `built-in material`.
@@ -49,17 +49,17 @@ pub enum Error {
         /// The names that exist.
         known: String,
     },
-    /// A source that holds something else than what is asked of it.
+    /// A source holds something other than what an operation needs.
     #[error("{what}: expected {expected}, found {found}")]
     Unsuitable {
         /// The source.
         what: String,
-        /// What it would have to hold.
+        /// What the operation needs.
         expected: &'static str,
-        /// What it holds, and what to do with that.
+        /// What the source holds, and what can be done with it.
         found: &'static str,
     },
-    /// An argument outside its domain.
+    /// An argument is outside its domain.
     #[error("{what}: expected {expected}, found {found}")]
     InvalidArgument {
         /// The argument.
@@ -69,7 +69,7 @@ pub enum Error {
         /// The value that was given.
         found: String,
     },
-    /// A covariance matrix stayed indefinite on every rung of the jitter ladder.
+    /// A covariance matrix stayed indefinite with every jitter that was tried.
     #[error(
         "covariance matrix of {size} samples: expected positive definite with a jitter of at most \
          {largest_jitter:e}, found a non-positive pivot"
@@ -80,7 +80,7 @@ pub enum Error {
         /// The last jitter tried, relative to the mean of the diagonal.
         largest_jitter: f64,
     },
-    /// A dense run that would not fit in memory.
+    /// A dense Gaussian process would not fit into memory.
     #[error(
         "a dense Gaussian process on {samples} samples: expected at most {limit_gib:.1} GiB, found a need of \
          {need_gib:.1} GiB and about {need_seconds:.0} s; take fewer samples or the lattice solver"

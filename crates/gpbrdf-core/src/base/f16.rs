@@ -1,13 +1,8 @@
-//! Half precision as a format of storage.
+//! Half precision as a storage format.
 
 use ::half::f16;
 
-/// The nearest number of half precision; beyond 65,504 the largest.
-pub(crate) fn round_to_half(x: f64) -> f64 {
-    to_half(x).to_f64()
-}
-
-/// The nearest half, beyond the range the largest.
+/// The nearest number of half precision; beyond 65,504 in size, the largest finite one.
 pub(crate) fn to_half(x: f64) -> f16 {
     f16::from_f64(x.clamp(f16::MIN.to_f64(), f16::MAX.to_f64()))
 }
@@ -19,8 +14,8 @@ mod tests {
     #[test]
     fn rounding_is_to_eleven_bits_and_stays_finite() {
         for x in [0.0, 1.0, -3.3, 7.123_456, 1e-3, 9e9, -9e9] {
-            let rounded = round_to_half(x);
-            assert!(rounded.is_finite() && round_to_half(rounded) == rounded);
+            let rounded = to_half(x).to_f64();
+            assert!(rounded.is_finite() && to_half(rounded).to_f64() == rounded);
             assert!((rounded - x).abs() <= x.abs() / 2048.0 || x.abs() > 65_504.0, "{x} {rounded}");
         }
     }

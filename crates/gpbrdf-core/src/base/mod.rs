@@ -1,8 +1,10 @@
-//! What has no subject of its own: errors, files written whole, random numbers, vector instructions, half precision.
+//! Utilities without a subject of their own: errors, files written whole, random numbers, vector
+//! instructions, half precision, linear algebra, numbers for people.
 
 pub(crate) mod atomic_file;
 pub(crate) mod error;
 pub(crate) mod f16;
+pub(crate) mod linalg;
 pub mod number;
 pub(crate) mod random;
 pub(crate) mod simd;

@@ -1,7 +1,7 @@
-//! Numbers for people.
+//! Numbers written for people.
 
-/// A number with `digits` significant digits: 1234 and 0.001234 for four of them, 1.234e-5 where that is shorter.
-/// Infinity is written as "inf", and what is no number as "NaN".
+/// A number with `digits` significant digits: 1234 and 0.001234 for four of them. Sizes below 1e-3 or from
+/// 1e5 on are written with an exponent, as in 1.234e-5. Zero is "0", infinity is "inf", and NaN is "NaN".
 #[must_use]
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {

@@ -1,11 +1,12 @@
-//! Seeded random numbers, and orders that spread evenly: the same on every machine and thread.
+//! Seeded random numbers and evenly spread orders, the same on every machine and for every number of threads.
 
-/// `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014).
+/// `SplitMix64` (G. L. Steele, D. Lea and C. H. Flood, "Fast Splittable Pseudorandom Number Generators",
+/// OOPSLA 2014).
 #[derive(Clone, Debug)]
 pub struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// A generator whose whole sequence follows from `seed`.
+    /// A generator whose whole sequence is determined by `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
@@ -26,8 +27,8 @@ impl SplitMix64 {
     }
 }
 
-/// `count` of the indices `0..n`, spread evenly over them: those whose product with the golden ratio has the smallest
-/// fractional part, in the order of that part. Any prefix of the result is spread evenly, too.
+/// `count` of the indices `0..n`, spread evenly over them: those whose product with the golden ratio has the
+/// smallest fractional part, in the order of that part. Every prefix of the result is spread evenly, too.
 #[must_use]
 pub fn golden_ratio_subset(n: usize, count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n).collect();

@@ -1,18 +1,19 @@
 //! Directions, half-difference angles and the warped box.
 //!
-//! Local frame with the normal `n = +z`; `wi` points to the light and `wo` to the viewer, both unit and away
-//! from the surface. Half-difference angles are those of S. Rusinkiewicz, "A New Change of Variables for
-//! Efficient BRDF Representation" (1998), with `phi_h` dropped (isotropic) and `phi_d` folded to `[0, pi)`
-//! (reciprocity).
+//! In the local frame the normal is `n = +z`; `wi` points to the light and `wo` to the viewer, both of unit
+//! length and away from the surface. Half-difference angles are those of S. Rusinkiewicz, "A New Change of
+//! Variables for Efficient BRDF Representation" (1998), with `phi_h` dropped (isotropy) and `phi_d` folded to
+//! `[0, pi)` (reciprocity).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::Vector3;
 
-/// Cosines are held at this where something is divided by them: closer to the horizon, quotients stop growing.
+/// Lower bound of cosines in denominators: smaller ones are replaced by it, so that quotients stay bounded.
 pub const HORIZON_COSINE: f64 = 1e-6;
 
-/// Metrics and their pictures leave out directions whose cosine is smaller: measurements there are extrapolated.
+/// Metrics and their pictures leave out directions whose cosine is smaller, since measurements are
+/// extrapolated there.
 pub const GRAZING_COSINE: f64 = 0.08;
 
 /// Half-difference angles in radians: `theta_h` and `theta_d` in `[0, pi/2]`, `phi_d` in `[0, pi)`.
@@ -33,20 +34,20 @@ impl HalfDiff {
         self.theta_h.is_finite() && self.theta_d.is_finite() && self.phi_d.is_finite()
     }
 
-    /// Angles of a pair of unit directions.
+    /// The angles of a pair of unit directions.
     ///
     /// `theta_h = atan2(|h_xy|, h_z)`, `theta_d = atan2(|wi - wo|, |wi + wo|)`, and `phi_d` is the azimuth of
-    /// `Ry(-theta_h) Rz(-phi_h) wi`: stable where `acos` is not.
+    /// `Ry(-theta_h) Rz(-phi_h) wi`. This is stable where `acos` is not.
     ///
-    /// Degenerate directions: for `wi = wo` `theta_d = 0` and `phi_d = 0`; for `h = n` the azimuth of `h` is
-    /// taken as 0, so `phi_d` is the azimuth of `wi`; for opposite directions (`wi = -wo`, both at the
+    /// Degenerate directions: for `wi = wo`, `theta_d = 0` and `phi_d = 0`; for `h = n` the azimuth of `h` is
+    /// taken as 0, so that `phi_d` is the azimuth of `wi`; for opposite directions (`wi = -wo`, both at the
     /// horizon) `h` is taken as `n`.
     #[must_use]
     pub fn from_directions(wi: &Vector3<f64>, wo: &Vector3<f64>) -> Self {
         let sum = wi + wo;
         let theta_d = (wi - wo).norm().atan2(sum.norm());
         let horizontal = sum.x.hypot(sum.y);
-        // Below this the half vector is the normal to rounding, and its azimuth is noise.
+        // Below this the half vector equals the normal to rounding, and its azimuth is noise.
         let (theta_h, cos_phi_h, sin_phi_h) = if horizontal <= 1e-15 {
             (0.0, 1.0, 0.0)
         } else {
@@ -98,7 +99,7 @@ pub fn theta_d_max(theta_h: f64, phi_d: f64) -> f64 {
     theta_h.cos().max(0.0).atan2(theta_h.sin() * phi_d.cos().abs())
 }
 
-/// `phi_d` folded into `[0, pi)`; reciprocity makes `phi_d` and `phi_d + pi` the same pair of directions.
+/// `phi_d` folded into `[0, pi)`: by reciprocity `phi_d` and `phi_d + pi` are the same pair of directions.
 #[must_use]
 pub fn fold_phi_d(phi_d: f64) -> f64 {
     // The usual case first: a remainder takes longer than the rest of a lookup.
@@ -110,14 +111,14 @@ pub fn fold_phi_d(phi_d: f64) -> f64 {
     if folded >= PI { 0.0 } else { folded }
 }
 
-/// A point of the warped box, in which the valid directions fill a whole product domain:
+/// A point of the warped box, in which the directions above the horizon fill a whole product domain:
 /// `u = sqrt(theta_h / (pi/2))` in `[0, 1]`, `v = theta_d / theta_d_max(theta_h, phi_d)` in `[0, 1]` and
 /// `phi = phi_d` in `[0, pi)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoxPoint {
     /// Square-root warped `theta_h`.
     pub u: f64,
-    /// `theta_d` in units of its largest valid value; above 1 below the horizon.
+    /// `theta_d` in units of its largest value above the horizon; greater than 1 below the horizon.
     pub v: f64,
     /// `phi_d`, radians.
     pub phi: f64,
@@ -164,7 +165,7 @@ pub fn direction(theta: f64, phi: f64) -> Vector3<f64> {
 mod tests {
     use super::*;
 
-    /// A seeded walk over the unit cube, enough for property loops.
+    /// Seeded points of the unit cube, enough for loops over properties.
     fn points(count: usize) -> impl Iterator<Item = [f64; 3]> {
         (1..=count).map(|i| {
             let i = i as f64;
@@ -215,7 +216,7 @@ mod tests {
             assert_eq!(angles.is_above_horizon(), point.v < 1.0, "{angles:?} {point:?}");
             let back = point.to_half_diff();
             assert!((back.theta_h - angles.theta_h).abs() < 1e-13);
-            // An error in theta_d_max comes back times v.
+            // An error in theta_d_max is multiplied by v on the way back.
             assert!((back.theta_d - angles.theta_d).abs() < 1e-13 * point.v.max(1.0));
         }
     }

@@ -29,7 +29,8 @@ impl Brdf for Material {
     }
 }
 
-/// All built-in materials: first seven reconstructions from published fits, then one of each other model.
+/// All built-in materials: seven reconstructions from published fits, then one material for each other
+/// analytic model.
 #[must_use]
 pub fn materials() -> &'static [Material] {
     &MATERIALS
@@ -38,7 +39,7 @@ pub fn materials() -> &'static [Material] {
 /// The built-in material called `name`.
 ///
 /// # Errors
-/// [`Error::UnknownName`], with the names that exist.
+/// [`Error::UnknownName`], which lists the names that exist.
 pub fn material(name: &str) -> Result<&'static Material> {
     MATERIALS.iter().find(|m| m.name == name).ok_or_else(|| Error::UnknownName {
         kind: "built-in material",
@@ -175,13 +176,13 @@ static MATERIALS: [Material; 14] = [
             diffuse: [0.03, 0.015, 0.01],
             specular: [0.95, 0.95, 0.95],
             roughness: 0.3,
-            // Reflectance 0.955, 0.638, 0.538 at normal incidence.
+            // These indices give a reflectance of 0.955, 0.638, 0.538 at normal incidence.
             ior: [86.9, 8.94, 6.50],
         }),
     },
 ];
 
-// Parameters published with Bagher et al. (2012): red, green, blue.
+// Parameters published with Bagher et al. (2012), in the order red, green, blue.
 
 const CHERRY_235: Sgd = Sgd {
     diffuse: [0.049_750_2, 0.021_190_2, 0.012_068_8],
@@ -293,7 +294,8 @@ mod tests {
         for m in materials() {
             assert_well_behaved(m, m.name);
             match m.brdf {
-                // Fits to measurements: nothing in the model bounds them at grazing incidence.
+                // These are fits to measurements: nothing in the model bounds their albedo at grazing
+                // incidence.
                 AnalyticBrdf::Sgd(_) => {
                     let found = albedo(m, 0.5, 512);
                     assert!(found.iter().all(|x| *x > 0.005 && *x < 0.7), "{} {found:?}", m.name);
@@ -355,11 +357,12 @@ mod tests {
         );
     }
 
+    #[cfg(feature = "formats")]
     #[test]
     fn published_fits_equal_the_table_of_parameters() {
         let Some(folder) = crate::test_data::data_dir() else { return };
         let mut reader = csv::ReaderBuilder::new()
-            // Some rows lack the alias; none of these seven does.
+            // Some rows lack the alias, but none of these seven does.
             .flexible(true)
             .from_path(folder.join("merl_fits/sgd_params.csv"))
             .unwrap();

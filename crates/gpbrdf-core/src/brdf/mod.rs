@@ -1,4 +1,4 @@
-//! What a reflectance is: the trait, angles, tables, and the built-in materials.
+//! Reflectance: the trait [`Brdf`], angles, tables, analytic models and the built-in materials.
 
 pub mod analytic;
 pub(crate) mod angles;
@@ -16,23 +16,24 @@ pub use table::{
 
 use nalgebra::Vector3;
 
-/// Linear sRGB triple. For a BRDF its unit is sr^-1.
+/// A linear sRGB triple. For a BRDF its unit is sr^-1.
 pub type Rgb = [f64; 3];
 
-/// A bidirectional reflectance distribution function, isotropic, RGB.
+/// A bidirectional reflectance distribution function with three colour channels. Tables, samples and models
+/// take it to be isotropic.
 pub trait Brdf: Send + Sync {
-    /// `f(wi, wo)` in sr^-1, cosine not included, with unit directions away from the surface in the local
-    /// frame (normal +z). Zero in every channel when either direction lies at or below the horizon.
+    /// `f(wi, wo)` in sr^-1, without the cosine. Both are unit directions away from the surface, in the local
+    /// frame (normal +z). Zero in every channel when either direction is at or below the horizon.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb;
 
-    /// `f` at half-difference angles.
+    /// `f` at half-difference angles; by default evaluated with the half vector above the x axis.
     fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
         let (wi, wo) = angles.to_directions();
         self.eval(&wi, &wo)
     }
 
-    /// `f` at many half-difference angles, into as many places of `out`. This is what tables and samples are made with:
-    /// a model evaluates whole blocks of directions at a time, without an allocation per direction.
+    /// `f` at many half-difference angles, one value in `out` for each. Tables and samples are filled by this
+    /// method, so that a model can evaluate whole blocks of directions without an allocation per direction.
     fn eval_many(&self, angles: &[HalfDiff], out: &mut [Rgb]) {
         for (angles, out) in angles.iter().zip(out) {
             *out = self.eval_half_diff(*angles);
@@ -40,16 +41,17 @@ pub trait Brdf: Send + Sync {
     }
 }
 
-/// A BRDF made symmetric and defined up to the horizon:
-/// `(f(a, b) + f(b, a)) / 2` where `a`, `b` are `wi`, `wo` lifted to a cosine of at least `min_cosine`.
+/// A BRDF made reciprocal and extended to the horizon: `(f(a, b) + f(b, a)) / 2`, where `a` and `b` are `wi`
+/// and `wo` lifted to a cosine of at least `min_cosine`.
 ///
-/// Measured tables obey Helmholtz reciprocity only up to noise and say nothing at grazing angles; this is the
-/// truth that fits and metrics see.
+/// Measurements obey Helmholtz reciprocity only up to noise and are unreliable at grazing angles. Where an
+/// RGL measurement or an analytic model is the truth for fits and metrics, it is wrapped in this type.
+/// Directions below the horizon are lifted, too: unlike other BRDFs, this one is not zero there.
 #[derive(Clone, Debug)]
 pub struct Reciprocal<B> {
     /// The wrapped BRDF.
     pub inner: B,
-    /// The smallest cosine at which `inner` is asked.
+    /// The smallest cosine at which `inner` is evaluated.
     pub min_cosine: f64,
 }
 

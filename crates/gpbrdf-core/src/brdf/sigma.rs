@@ -1,20 +1,20 @@
-//! The uncertainty of a table.
+//! The uncertainty of a table, cell by cell.
 
 use crate::base::error::{Error, Result};
 use crate::brdf::table::{BrdfTable, N_CELLS, Trilinear};
 
 /// Posterior standard deviation of the latent target at the centre of every cell, in target units: with the
-/// logarithmic transform 0.05 reads as five per cent. Cells below the horizon hold the value at the horizon.
+/// logarithmic transform, 0.05 means five per cent. Cells below the horizon hold the value at the horizon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SigmaTable {
     planes: Vec<Vec<f32>>,
 }
 
 impl SigmaTable {
-    /// One plane in MERL order for all channels, or three.
+    /// A table from one plane in MERL order that serves all channels, or from one plane per channel.
     ///
     /// # Errors
-    /// Another number of planes, or of values in one than [`N_CELLS`].
+    /// [`Error::InvalidArgument`] unless there are one or three planes of [`N_CELLS`] values each.
     pub fn from_planes(planes: Vec<Vec<f32>>) -> Result<Self> {
         if !matches!(planes.len(), 1 | 3) {
             return Err(Error::argument("planes of sigma", "1 or 3", planes.len()));
@@ -37,7 +37,7 @@ impl SigmaTable {
         self.planes[channel.min(self.planes.len() - 1)][cell]
     }
 
-    /// The largest sigma of one cell over the channels: what a single number stands for.
+    /// The largest sigma of one cell over the channels, for uses that need a single number.
     #[must_use]
     pub fn largest(&self, cell: usize) -> f32 {
         self.planes.iter().fold(0.0, |largest, plane| largest.max(plane[cell]))
@@ -53,7 +53,7 @@ impl SigmaTable {
         sum
     }
 
-    /// Sigma of each channel as a table, to be looked up like one.
+    /// Sigma of each channel as a table, for code that looks up tables of three channels.
     #[must_use]
     pub fn to_table(&self) -> BrdfTable {
         let cell = |cell| std::array::from_fn(|channel| self.value(cell, channel));

@@ -1,4 +1,4 @@
-//! The MERL-shaped table: 90 x 90 x 180 cells of RGB in half-difference angles.
+//! The table in the shape of the MERL database: 90 x 90 x 180 cells of RGB in half-difference angles.
 
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -19,7 +19,7 @@ pub const N_PHI_D: usize = 180;
 /// Cells of a table: 1,458,000.
 pub const N_CELLS: usize = N_THETA_H * N_THETA_D * N_PHI_D;
 
-/// Cells of one `i_theta_h`, which follow one another.
+/// Number of cells with the same `i_theta_h`; they are contiguous.
 pub const SLAB: usize = N_THETA_D * N_PHI_D;
 
 /// Position of a cell: `i_phi_d + 180 (i_theta_d + 90 i_theta_h)`.
@@ -34,8 +34,8 @@ pub const fn cell_indices(index: usize) -> (usize, usize, usize) {
     (index / (N_THETA_D * N_PHI_D), index / N_PHI_D % N_THETA_D, index % N_PHI_D)
 }
 
-/// The `i_phi_d` in `0..90` whose cells, in a bilateral material, hold the values of `i_phi_d`: the centres of the two are
-/// at `phi_d` and `pi - phi_d`.
+/// The column in `0..90` that holds the same values as the column `i_phi_d` in a bilateral material: the
+/// centres of the two columns are at `phi_d` and `pi - phi_d`.
 #[must_use]
 pub const fn mirrored_column(i_phi_d: usize) -> usize {
     let mirror = N_PHI_D - 1 - i_phi_d;
@@ -54,10 +54,10 @@ pub fn cell_center(i_theta_h: usize, i_theta_d: usize, i_phi_d: usize) -> HalfDi
     }
 }
 
-/// A BRDF tabulated like the MERL database (W. Matusik et al. 2003): a value in sr^-1 stands at the centre of
+/// A BRDF tabulated like the MERL database (W. Matusik et al. 2003), with a value in sr^-1 for the centre of
 /// each of 90 x 90 x 180 cells over (square-root warped `theta_h`, `theta_d`, `phi_d`).
 ///
-/// A negative channel means "no data" there. 17.5 MB.
+/// A negative channel means that the cell has no data. The table takes 17.5 MB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BrdfTable {
     values: Vec<[f32; 3]>,
@@ -65,7 +65,7 @@ pub struct BrdfTable {
 
 /// The eight cells and weights of one trilinear lookup.
 ///
-/// Computed once, it serves every table and channel.
+/// It is computed once and then used for every table and channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Trilinear {
     cells: [u32; 8],
@@ -74,7 +74,7 @@ pub struct Trilinear {
 
 impl Trilinear {
     /// The lookup at `angles`: linear in `(sqrt(theta_h / (pi/2)), theta_d, phi_d)` between cell centres,
-    /// clamped in the first two, periodic in the third.
+    /// clamped in the first two coordinates, periodic in the third.
     #[must_use]
     pub fn new(angles: HalfDiff) -> Self {
         let (h0, h1, wh) = clamped((angles.theta_h.max(0.0) / FRAC_PI_2).sqrt(), N_THETA_H);
@@ -104,16 +104,17 @@ impl Trilinear {
     }
 }
 
-/// Lower node, upper node and weight of the upper one, on `n` cell centres over `[0, 1]`, clamped.
+/// The lower node, the upper node and the weight of the upper one at `t`, for `n` cell centres over `[0, 1]`.
+/// Beyond the outermost centres `t` is clamped.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n - 1]")]
 fn clamped(t: f64, n: usize) -> (usize, usize, f64) {
-    // max before min, so that NaN becomes 0.
+    // max comes before min, so that NaN becomes 0.
     let x = (t * n as f64 - 0.5).max(0.0).min((n - 1) as f64);
     let low = x as usize;
     (low, (low + 1).min(n - 1), x - low as f64)
 }
 
-/// The same with the ends joined.
+/// Like [`clamped`], but periodic: the last centre is followed by the first.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x lies within [0, n)")]
 fn periodic(t: f64, n: usize) -> (usize, usize, f64) {
     let x = (t * n as f64 - 0.5).rem_euclid(n as f64);
@@ -125,7 +126,7 @@ impl BrdfTable {
     /// A table of `values` in MERL order ([`cell_index`]).
     ///
     /// # Errors
-    /// Another number of values than [`N_CELLS`].
+    /// [`Error::InvalidArgument`] unless there are [`N_CELLS`] values.
     pub fn from_values(values: Vec<[f32; 3]>) -> Result<Self> {
         if values.len() == N_CELLS {
             Ok(Self { values })
@@ -134,7 +135,7 @@ impl BrdfTable {
         }
     }
 
-    /// A table of [`N_CELLS`] values by the caller's construction.
+    /// A table of values in MERL order; the caller makes sure that there are [`N_CELLS`] of them.
     pub(crate) fn from_cells(values: Vec<[f32; 3]>) -> Self {
         debug_assert_eq!(values.len(), N_CELLS);
         Self { values }
@@ -164,8 +165,8 @@ impl BrdfTable {
         self.values[cell_index(i_theta_h, i_theta_d, i_phi_d)]
     }
 
-    /// The table without gaps: a cell without data takes the value of the nearest smaller `theta_d` that has some, else of
-    /// the nearest larger one, else zero.
+    /// The table without gaps: a cell without data takes the value of the nearest smaller `theta_d` that has
+    /// data, else of the nearest larger one. Where a whole column has no data, it becomes zero.
     #[must_use]
     pub fn filled(&self) -> Cow<'_, Self> {
         let missing = |value: &[f32; 3]| !value.iter().all(|&x| x >= 0.0);
@@ -186,7 +187,7 @@ impl BrdfTable {
                         values[along(d)] = values[along(d + 1)];
                     }
                 }
-                // Still missing only where the whole column is.
+                // The cell is still missing only if its whole column is.
                 if missing(&values[along(0)]) {
                     (0..N_THETA_D).for_each(|d| values[along(d)] = [0.0; 3]);
                 }
@@ -195,14 +196,14 @@ impl BrdfTable {
         Cow::Owned(Self { values })
     }
 
-    /// Whether any of the cells of a lookup that count has data.
+    /// Whether any cell with a positive weight in the lookup has data.
     fn has_data(&self, at: &Trilinear) -> bool {
         let data = |cell: usize| self.values[cell].iter().all(|&x| x >= 0.0);
         at.corners().any(|(cell, weight)| weight > 0.0 && data(cell))
     }
 
-    /// Trilinear interpolation, sr^-1. Cells without data (a negative channel) take no part, and the other
-    /// weights are scaled up in their place; zero where all eight are without data.
+    /// Trilinear interpolation, sr^-1. Cells without data (a negative channel) are left out, and the weights
+    /// of the others are scaled up to a sum of 1. Zero where none of the eight cells has data.
     #[must_use]
     pub fn lookup(&self, at: &Trilinear) -> [f32; 3] {
         let mut sum = [0.0f32; 3];
@@ -228,8 +229,9 @@ impl Brdf for BrdfTable {
         self.eval_half_diff(HalfDiff::from_directions(wi, wo))
     }
 
-    /// Trilinear; where all eight cells are without data, the value at the nearest smaller `theta_d` that has some, as
-    /// near the horizon measured tables have gaps. Zero where there is none.
+    /// Trilinear interpolation. Measured tables have gaps near the horizon: where none of the eight cells has
+    /// data, the value at the nearest smaller `theta_d` that has data is used, or zero if there is none.
+    /// Angles below the horizon are looked up like any others.
     fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
         let step = FRAC_PI_2 / N_THETA_D as f64;
         let mut at = angles;

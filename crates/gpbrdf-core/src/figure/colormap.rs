@@ -1,14 +1,14 @@
-//! Two colour maps that colour-blind readers can read.
+//! Two colour maps that people with colour blindness can read.
 
 use crate::figure::picture::Rgb8;
 
-/// A map from `[0, 1]` to colours, linear in sRGB between published figures.
+/// A map from `[0, 1]` to colours, linear in sRGB between published colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colormap {
-    /// Dark to bright, for magnitudes: viridis by S. van der Walt and N. Smith (2015, CC0), at ninths.
+    /// Dark to bright, for magnitudes: viridis by S. van der Walt and N. Smith (2015, CC0), given at ninths.
     Sequential,
-    /// Blue over pale yellow to red, for signed differences: "sunset" by P. Tol, "Colour Schemes", SRON technical
-    /// note SRON/EPS/TN/09-002 (2021), at tenths.
+    /// Blue over pale yellow to red, for signed differences: "sunset" by P. Tol, "Colour Schemes", SRON
+    /// technical note SRON/EPS/TN/09-002 (2021), given at tenths.
     Diverging,
 }
 

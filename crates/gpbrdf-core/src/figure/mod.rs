@@ -1,4 +1,4 @@
-//! Pictures for people.
+//! Figures and pictures for people.
 
 mod colormap;
 mod panel;

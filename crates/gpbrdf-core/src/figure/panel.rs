@@ -1,4 +1,4 @@
-//! Figures: truth, prediction and difference side by side, with captions, axes and scales.
+//! Figures that show truth, prediction and difference side by side, with captions, axes and scales.
 
 use crate::base::error::Result;
 use crate::base::number::short;
@@ -13,20 +13,20 @@ use crate::judge::image_metrics::{exposed_difference, exposure_of, psnr};
 const BACKGROUND: Rgb8 = [34, 34, 38];
 const INK: Rgb8 = [226, 226, 230];
 const FAINT: Rgb8 = [160, 160, 168];
-/// Pixels to a dot of the font, and the height of a line of text.
+/// Pixels per dot of the font, and the height of a line of text.
 const SCALE: usize = 2;
 const LINE: usize = 8 * SCALE;
 const MARGIN: usize = 28;
-/// Between panels, without axes and with them, whose labels hang over.
+/// Gap between panels, without axes and with them; labels of axes extend into it.
 const GAP: usize = 44;
 const AXES_GAP: usize = 76;
 const SMALL_GAP: usize = 10;
 const TICK: usize = 6;
-/// How far a subscript hangs below its line.
+/// How far a subscript is below its line.
 const SUBSCRIPT_DROP: usize = 3 * SCALE;
-/// Width of a colour bar, and its distance from the panel.
+/// Width of a colour bar.
 const BAR: usize = 18;
-/// Room to the left of the first panel for the labels of the y axis.
+/// Space to the left of the first panel for the labels of the y axis.
 const Y_LABELS: usize = 104;
 
 /// One picture of a figure.
@@ -34,9 +34,9 @@ const Y_LABELS: usize = 104;
 pub struct Panel {
     /// The picture.
     pub picture: Picture,
-    /// What is written above it.
+    /// The text above it.
     pub caption: &'static str,
-    /// What its colours mean, where they are false ones: drawn as a bar beside it.
+    /// The meaning of its colours if they are false ones; it is drawn as a bar beside the picture.
     pub scale: Option<Scale>,
 }
 
@@ -45,9 +45,9 @@ pub struct Panel {
 pub struct Scale {
     /// The colours.
     pub map: Colormap,
-    /// The value of the lowest one.
+    /// The value of the lowest colour.
     pub low: f64,
-    /// The value of the highest one.
+    /// The value of the highest colour.
     pub high: f64,
 }
 
@@ -56,13 +56,15 @@ struct Axes {
     square_theta_h: bool,
 }
 
-/// A figure of image slices: truth, prediction and their difference; without a truth, the prediction alone.
+/// A figure of image slices: truth, prediction and their difference, or the prediction alone if there is no
+/// truth.
 ///
-/// The difference is [`Slice::log_difference`], red where the prediction is too bright; its scale is symmetric and ends at
-/// [`round_limit`].
+/// The difference is [`Slice::log_difference`], red where the prediction is too bright. Its scale is
+/// symmetric and ends at [`round_limit`].
 ///
 /// # Errors
-/// Those of [`Slice::log_difference`]; slices taken with the same options give none.
+/// The errors of [`Slice::log_difference`]; they do not occur, since both slices are taken with the same
+/// options.
 pub fn slice_figure(
     title: &str,
     truth: Option<&dyn Brdf>,
@@ -94,10 +96,12 @@ pub fn slice_figure(
     Ok(compose(&join(title, &shown), &panels, Some(&axes), &note))
 }
 
-/// A figure of sphere pictures: truth, prediction and their difference; without a truth, the prediction alone. All have
-/// the exposure of [`exposure_of`] the first and a gamma of 2.2.
+/// A figure of sphere pictures: truth, prediction and their difference, or the prediction alone if there is
+/// no truth. All are shown with the exposure of the truth, or else of the prediction ([`exposure_of`]), and
+/// with a gamma of 2.2.
 ///
-/// The difference is [`exposed_difference`], red where the prediction is too bright; the title shows the PSNR of `psnr_env`, or of the pictures themselves without it.
+/// The difference is [`exposed_difference`], red where the prediction is too bright. With a truth, the title
+/// shows a PSNR: `psnr_env` if it is given, else that of the pictures.
 ///
 /// # Errors
 /// [`crate::Error::InvalidArgument`] when the pictures differ in size.
@@ -128,7 +132,7 @@ pub fn sphere_figure(
     Ok(compose(&join(title, &shown), &panels, None, &note))
 }
 
-/// A figure of pictures in a row, with a title above, captions, colour bars and a note below.
+/// A figure of pictures in a row, with a title above, captions, colour bars, and a note below.
 #[must_use]
 pub fn panel_figure(title: &str, panels: &[Panel], note: &str) -> Picture {
     compose(title, panels, None, note)
@@ -146,7 +150,7 @@ impl Panel {
 }
 
 impl Scale {
-    /// The labels of five ticks from the top down.
+    /// The labels of five ticks, from the top down.
     fn labels(&self) -> [String; 5] {
         std::array::from_fn(|i| {
             let value = self.high + (self.low - self.high) * i as f64 / 4.0;
@@ -154,7 +158,7 @@ impl Scale {
         })
     }
 
-    /// Room that the bar and its labels take to the right of the panel.
+    /// Width that the bar and its labels take to the right of the panel.
     fn width(&self) -> usize {
         let labels = self.labels();
         let widest = labels.iter().map(|label| Picture::text_width(label, SCALE)).max().unwrap_or(0);
@@ -171,7 +175,7 @@ fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Pi
     for (i, panel) in panels.iter().enumerate() {
         right += if i > 0 { gap } else { 0 };
         places.push(right);
-        // A caption wider than its panel widens the panel's place.
+        // A caption that is wider than its panel makes the panel's place wider.
         right += panel.picture.width().max(Picture::text_width(panel.caption, SCALE));
         right += panel.scale.as_ref().map_or(0, Scale::width);
     }
@@ -210,7 +214,7 @@ fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Pi
     canvas
 }
 
-/// Frame, ticks and labels at 0, 30, 60 and 90 degrees of a slice at `(x, y)`.
+/// Draws frame, ticks and labels at 0, 30, 60 and 90 degrees of a slice at `(x, y)`.
 fn draw_axes(canvas: &mut Picture, x: usize, y: usize, size: usize, axes: &Axes, y_labels: bool) {
     let (left, top) = (x as i64, y as i64);
     for (dx, dy, width, height) in
@@ -223,9 +227,9 @@ fn draw_axes(canvas: &mut Picture, x: usize, y: usize, size: usize, axes: &Axes,
         let t = f64::from(degrees) / 90.0;
         let across = along(if axes.square_theta_h { t.sqrt() } else { t }, size);
         canvas.fill((x + across) as i64, (y + size) as i64, 1, TICK, FAINT);
-        // The warp crowds the last two labels of a small slice.
+        // In a small slice the warp brings the last two labels too close together.
         if degrees != 60 || size - across > 3 * LINE + SMALL_GAP {
-            // Centred on the digits: the degree sign hangs over.
+            // The label is centred on its digits, without the degree sign.
             let digits = Picture::text_width(&degrees.to_string(), SCALE);
             let text_x = (x + across) as i64 - (digits / 2) as i64;
             canvas.text(text_x, (y + size + TICK + SMALL_GAP) as i64, SCALE, FAINT, &label);
@@ -246,7 +250,7 @@ fn draw_axes(canvas: &mut Picture, x: usize, y: usize, size: usize, axes: &Axes,
     }
 }
 
-/// A vertical colour bar with five labelled ticks.
+/// Draws a vertical colour bar with five labelled ticks.
 fn draw_scale(canvas: &mut Picture, x: usize, y: usize, height: usize, scale: &Scale) {
     for row in 0..height {
         let t = 1.0 - (row as f64 + 0.5) / height as f64;
@@ -260,7 +264,7 @@ fn draw_scale(canvas: &mut Picture, x: usize, y: usize, height: usize, scale: &S
     }
 }
 
-/// The pixel at a share `t` of a side.
+/// The pixel at a fraction `t` of a side.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "t is in [0, 1]")]
 fn along(t: f64, side: usize) -> usize {
     (t * side.saturating_sub(1) as f64).round() as usize
@@ -271,7 +275,7 @@ fn centred(canvas: &mut Picture, x: usize, y: usize, colour: Rgb8, text: &str) {
     canvas.text(x as i64 - half as i64, y as i64, SCALE, colour, text);
 }
 
-/// A sphere picture on the figure's background, the pixels on the rim mixed with it by their coverage.
+/// A sphere picture on the figure's background. Pixels on the rim are mixed with it by their coverage.
 fn disc(image: &Image, colour: impl Fn(Rgb) -> Rgb8) -> Picture {
     disc_by_index(image, |i| colour(wide(&image.pixels()[i])))
 }
@@ -319,7 +323,7 @@ mod tests {
         [0.16 + lobe, 0.018 + lobe, 0.014 + lobe]
     }
 
-    /// Off by a ripple of 4 percent.
+    /// Differs from [`glossy`] by a ripple of 4 percent.
     fn rippled(a: HalfDiff) -> Rgb {
         let ripple = 1.0 + 0.04 * (9.0 * a.theta_h).sin() * (7.0 * a.theta_d).cos();
         glossy(a).map(|x| x * ripple)

@@ -1,4 +1,4 @@
-//! An 8-bit picture to draw and write on, and its PNG file.
+//! An 8-bit picture with drawing and text, and its PNG file.
 
 use std::io::Write;
 use std::path::Path;
@@ -6,16 +6,17 @@ use std::path::Path;
 use font8x8::legacy::{BASIC_LEGACY, GREEK_LEGACY, LATIN_LEGACY};
 use image::ImageEncoder as _;
 
+use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 
-/// An sRGB colour, 8 bits a channel.
+/// An sRGB colour, 8 bits per channel.
 pub type Rgb8 = [u8; 3];
 
-/// A lower-case theta of full height: the font's own is as low as an `e`, and reads as one.
+/// A lower-case theta of full height. The font's own theta is as low as an `e`, and looks like one.
 const THETA: [u8; 8] = [0x1c, 0x36, 0x36, 0x3e, 0x36, 0x36, 0x1c, 0x00];
 
-/// An 8-bit sRGB picture, rows from top to bottom. Drawing outside of it does nothing.
+/// An 8-bit sRGB picture, rows from top to bottom. Drawing outside of it has no effect.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     width: usize,
@@ -72,8 +73,8 @@ impl Picture {
 
     /// Writes `text` with its upper left corner at `(x, y)`, each dot of the 8 x 8 font `scale` pixels wide.
     ///
-    /// An underscore after a Greek letter makes the next character a subscript, three dots lower. A character that the font lacks
-    /// shows as `?`.
+    /// An underscore after a Greek letter makes the next character a subscript, three dots lower. A character
+    /// that is not in the font is shown as `?`.
     pub fn text(&mut self, x: i64, y: i64, scale: usize, colour: Rgb8, text: &str) {
         for letter in letters(text, scale) {
             for (row, bits) in glyph(letter.character).into_iter().enumerate() {
@@ -88,7 +89,8 @@ impl Picture {
         }
     }
 
-    /// The width in pixels that [`Picture::text`] takes, without the empty column after the last character.
+    /// The width in pixels of a text that is written by [`Picture::text`], without the empty column after the
+    /// last character.
     #[must_use]
     pub fn text_width(text: &str, scale: usize) -> usize {
         letters(text, scale).last().map_or(0, |letter| letter.x + 7 * scale)
@@ -97,7 +99,7 @@ impl Picture {
     /// Writes the picture as PNG.
     ///
     /// # Errors
-    /// What `out` answers; also an empty picture, which PNG cannot hold.
+    /// Any error of `out`; also an error for an empty picture, which PNG cannot hold.
     pub fn write_png(&self, out: &mut impl Write) -> std::io::Result<()> {
         let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
         image::codecs::png::PngEncoder::new(&mut *out)
@@ -118,10 +120,11 @@ impl Picture {
     ///
     /// # Errors
     /// [`Error::Io`] when the file cannot be written.
-    pub fn save_png(&self, path: &Path) -> Result<()> {
-        std::fs::File::create(path)
-            .and_then(|file| self.write_png(&mut std::io::BufWriter::new(file)))
-            .map_err(|source| Error::write(path, source))
+    pub fn save_png(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let mut file = AtomicFile::create(path)?;
+        self.write_png(&mut file).map_err(|source| Error::write(path, source))?;
+        file.commit()
     }
 
     fn set(&mut self, x: i64, y: i64, colour: Rgb8) {
@@ -135,7 +138,8 @@ impl Picture {
 /// Writes `width x height` pixels of RGBA, rows from top to bottom, as PNG.
 ///
 /// # Errors
-/// What `out` answers, or [`std::io::ErrorKind::Other`] unless there are `width x height` pixels, at least one.
+/// Any error of `out`, or [`std::io::ErrorKind::Other`] unless there are `width x height` pixels, at least
+/// one.
 pub fn write_rgba_png(
     out: &mut impl Write,
     width: usize,
@@ -153,21 +157,22 @@ pub fn write_rgba_png(
     out.flush()
 }
 
-/// Linear RGB as shown: times `scale`, clipped to `[0, 1]`, raised to `1 / gamma`, rounded. NaN is black.
+/// Linear RGB as it is shown: times `scale`, clipped to `[0, 1]`, raised to `1 / gamma`, rounded. NaN becomes
+/// black.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the value is within [0, 255.5]")]
 pub(crate) fn tone_map(linear: Rgb, scale: f64, gamma: f64) -> Rgb8 {
     linear.map(|x| ((x * scale).clamp(0.0, 1.0).powf(1.0 / gamma) * 255.0 + 0.5) as u8)
 }
 
-/// One character and where it stands.
+/// One character and its place.
 struct Letter {
     character: char,
     x: usize,
     y: usize,
 }
 
-/// Lays out a line of text.
+/// Places the characters of a line of text.
 fn letters(text: &str, scale: usize) -> Vec<Letter> {
     let mut letters = Vec::new();
     let mut x = 0;
@@ -187,7 +192,7 @@ fn letters(text: &str, scale: usize) -> Vec<Letter> {
     letters
 }
 
-/// The rows of a character, lowest bit left.
+/// The rows of a character; the lowest bit is at the left.
 fn glyph(character: char) -> [u8; 8] {
     let at = character as usize;
     let found = match character {

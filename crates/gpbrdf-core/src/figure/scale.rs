@@ -1,9 +1,9 @@
-//! Where colour scales end.
+//! The limits of colour scales.
 
 use crate::judge::image_metrics::percentile;
 
-/// The end of a colour scale: 1, 2 or 5 times a power of ten, at or above the 99th percentile of the absolute values in
-/// `mask`; at least 1e-6.
+/// The limit of a colour scale: the smallest number of the form 1, 2 or 5 times a power of ten that is at
+/// least the 99th percentile of the finite absolute values in `mask`, and at least 1e-6.
 #[must_use]
 pub fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
     let finite = values.iter().zip(mask).filter(|&(x, &inside)| inside && x.is_finite());

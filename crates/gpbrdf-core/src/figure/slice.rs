@@ -1,4 +1,4 @@
-//! Image slices: a BRDF at one `phi_d`, as Disney's BRDF Explorer shows it.
+//! Image slices: a BRDF at one `phi_d`, as in Disney's BRDF Explorer.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,21 +8,21 @@ use crate::brdf::{Brdf, Rgb};
 use crate::figure::picture::{Picture, Rgb8, tone_map};
 use crate::sample::log_value;
 
-/// What stands where a direction is below the horizon.
+/// The colour where a direction is below the horizon.
 const BELOW_HORIZON: Rgb8 = [58, 58, 64];
 
 /// How an image slice is taken and shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceOptions {
-    /// The slice's `phi_d`, radians. At the default, pi/2, every pixel is above the horizon.
+    /// The slice's `phi_d`, radians. At the default, pi/2, all pixels are above the horizon.
     pub phi_d: f64,
-    /// Exposure in stops: values are shown times `2^exposure`.
+    /// Exposure in stops: values are multiplied by `2^exposure`.
     pub exposure: f64,
-    /// Values are shown raised to `1 / gamma`.
+    /// Exposed values are raised to `1 / gamma`.
     pub gamma: f64,
-    /// Whether `x` is `sqrt(theta_h / (pi/2))`, the table's own warp, and not `theta_h / (pi/2)`.
+    /// Whether `x` is `sqrt(theta_h / (pi/2))`, the warp of the table, instead of `theta_h / (pi/2)`.
     pub square_theta_h: bool,
-    /// Rows and columns.
+    /// Number of rows and of columns.
     pub size: usize,
 }
 
@@ -32,8 +32,8 @@ impl Default for SliceOptions {
     }
 }
 
-/// A BRDF at one `phi_d`: `theta_h` from 0 to 90 degrees left to right, `theta_d` from 0 to 90 degrees bottom to
-/// top, one value at each pixel's centre.
+/// A BRDF at one `phi_d`, with one value at the centre of each pixel. `theta_h` increases from 0 to 90
+/// degrees left to right, `theta_d` from 0 to 90 degrees bottom to top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slice {
     size: usize,
@@ -59,34 +59,34 @@ impl Slice {
         }
     }
 
-    /// Rows and columns.
+    /// Number of rows and of columns.
     #[must_use]
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// The values in sr^-1, rows from top to bottom. Where a direction is below the horizon, whatever the BRDF
-    /// says there.
+    /// The values in sr^-1, rows from top to bottom. Where a direction is below the horizon, the value is
+    /// whatever the BRDF returns there.
     #[must_use]
     pub fn values(&self) -> &[Rgb] {
         &self.values
     }
 
-    /// Whether both directions of each pixel are above the horizon.
+    /// For each pixel, whether both directions are above the horizon.
     #[must_use]
     pub fn above_horizon(&self) -> &[bool] {
         &self.above_horizon
     }
 
-    /// The slice as shown: times `2^exposure`, clipped to `[0, 1]`, raised to `1 / gamma`; dark grey below the
-    /// horizon.
+    /// The slice as it is shown: times `2^exposure`, clipped to `[0, 1]`, raised to `1 / gamma`. Dark grey
+    /// below the horizon.
     #[must_use]
     pub fn tone_mapped(&self, options: &SliceOptions) -> Picture {
         let scale = options.exposure.exp2();
         self.picture(|i| tone_map(self.values[i], scale, options.gamma))
     }
 
-    /// A picture of `colour(pixel)` above the horizon.
+    /// A picture of `colour(pixel)` above the horizon, and of dark grey below it.
     pub(crate) fn picture(&self, colour: impl Fn(usize) -> Rgb8) -> Picture {
         Picture::from_fn(self.size, self.size, |x, y| {
             let i = y * self.size + x;
@@ -94,8 +94,8 @@ impl Slice {
         })
     }
 
-    /// `ln(f^ + 1e-3) - ln(f + 1e-3)` against `truth`, averaged over R, G and B, negative values taken as 0;
-    /// 0.01 is one percent.
+    /// `ln(f^ + 1e-3) - ln(f + 1e-3)` of this slice against `truth`, averaged over R, G and B. Negative
+    /// values are taken as 0; a difference of 0.01 is one percent.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] when the slices differ in size.

@@ -1,4 +1,4 @@
-//! SHA-256 sums: which published file a file is, and which file a model was made from.
+//! SHA-256 sums. They tell which published file a file is, and which file a model was made from.
 
 use std::fmt::Write as _;
 use std::io::{self, Read};

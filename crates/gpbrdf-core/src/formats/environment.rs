@@ -7,15 +7,15 @@ use crate::base::error::{Error, Result};
 use crate::formats::exr;
 use crate::judge::Environment;
 
-/// The most pixels that [`read_environment`] takes: 3.2 GB.
+/// The largest number of pixels that [`read_environment`] accepts; they take 3.2 GB.
 const MAX_PIXELS: usize = 1 << 28;
 
-/// Reads a Radiance `.hdr` or an `OpenEXR` file (first layer with R, G and B), told apart by content.
+/// Reads a Radiance `.hdr` or an `OpenEXR` file (its first layer with R, G and B); the content decides which.
 /// Negative values become 0.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read, [`Error::UnknownFormat`] when it is of neither kind,
-/// [`Error::Format`] when it is broken, over 2^28 pixels, or holds a value that is not finite.
+/// [`Error::Io`] when the file cannot be read, [`Error::UnknownFormat`] when it has neither format,
+/// [`Error::Format`] when it is damaged, has more than 2^28 pixels, or holds a value that is not finite.
 pub fn read_environment(path: impl AsRef<Path>) -> Result<Environment> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| Error::read(path, source))?;
@@ -40,7 +40,7 @@ pub fn read_environment(path: impl AsRef<Path>) -> Result<Environment> {
     let (width, height, mut pixels) =
         decoded.map_err(|found| broken("a latitude-longitude map in RGB", found))?;
     for value in pixels.iter_mut().flatten() {
-        // Not `max`, which would make 0 of NaN.
+        // `max` is not used, since it would turn NaN into 0.
         if *value < 0.0 {
             *value = 0.0;
         }
@@ -48,7 +48,7 @@ pub fn read_environment(path: impl AsRef<Path>) -> Result<Environment> {
     Environment::new(width, height, pixels).map_err(|error| broken("finite radiance", error.to_string()))
 }
 
-/// Width, height and pixels, or what is wrong.
+/// Width, height and pixels, or a description of what is wrong.
 type Decoded = Result<(usize, usize, Vec<[f32; 3]>), String>;
 
 fn decode_hdr(bytes: &[u8]) -> Decoded {

@@ -1,4 +1,4 @@
-//! What a format is, and which of them a file has.
+//! File formats, and how the format of a file is recognised.
 
 use std::fmt::{self, Write as _};
 use std::io::Read;
@@ -9,15 +9,15 @@ use crate::formats::FORMATS;
 use crate::formats::read::open;
 use crate::formats::source::Content;
 
-/// A format that is read. Each is a constant beside its reader, listed in [`FORMATS`].
+/// A file format that can be read. Each format is a constant beside its reader and is listed in [`FORMATS`].
 #[derive(Clone, Copy)]
 pub struct Format {
     /// The kind of content, for people, for example `RGL measurement`.
     pub name: &'static str,
-    /// The kind of file, for the list of what is read, for example `RGL .bsdf`.
+    /// The kind of file, for lists of what can be read, for example `RGL .bsdf`.
     pub file: &'static str,
-    /// Whether a file with this start has the format. Damaged files are recognised as long as their start is whole, so
-    /// that reading them says what is wrong.
+    /// Whether a file that starts like this has the format. A damaged file is recognised as long as its start
+    /// is whole; reading it then says what is wrong.
     pub(crate) recognises: fn(&Head<'_>) -> bool,
     /// Reads a file of the format.
     pub(crate) read: fn(&Path) -> Result<Content>,
@@ -43,7 +43,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// The start of a file, as recognisers look at it.
+/// The start of a file, as it is passed to [`Format::recognises`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Head<'a> {
     /// The first bytes.
@@ -52,9 +52,9 @@ pub(crate) struct Head<'a> {
     pub(crate) length: u64,
     /// Whether the file is called `*.binary`.
     pub(crate) named_binary: bool,
-    /// The bytes as text without byte order mark, if they are text.
+    /// The bytes as text without a byte order mark, if they are text.
     pub(crate) text: Option<&'a str>,
-    /// The first line of the text that is no comment.
+    /// The first line of the text that is not a comment.
     pub(crate) line: Option<&'a str>,
 }
 
@@ -67,10 +67,10 @@ impl<'a> Head<'a> {
     }
 }
 
-/// How much of a file is looked at.
+/// How many bytes of a file are examined.
 const HEAD_BYTES: u64 = 64 << 10;
 
-/// Starts of files that are taken for a measurement by mistake.
+/// Starts of files that are sometimes mistaken for a measurement, and what to call these files.
 const FOREIGN: [(&[u8], &str); 16] = [
     (b"\x89PNG\r\n\x1A\n", "a PNG image"),
     (b"\xFF\xD8\xFF", "a JPEG image"),
@@ -90,13 +90,14 @@ const FOREIGN: [(&[u8], &str); 16] = [
     (b"\x89HDF\r\n\x1A\n", "an HDF5 file"),
 ];
 
-/// The format of a file, by its content.
+/// Recognises the format of a file by its content.
 ///
-/// The name counts in one case only: binary content of no known format called `*.binary` is taken for a MERL table.
+/// The name is used in one case only: binary content of no known format in a file called `*.binary` is taken
+/// for a MERL table.
 ///
 /// # Errors
-/// [`Error::Io`] when the file is a directory or cannot be read, [`Error::UnknownFormat`] with a description of
-/// the content when it is empty or of no known format.
+/// [`Error::Io`] when the file is a directory or cannot be read; [`Error::UnknownFormat`], which describes
+/// the content, when it is empty or has no known format.
 pub fn recognise(path: impl AsRef<Path>) -> Result<&'static Format> {
     let path = path.as_ref();
     let (file, length) = open(path)?;
@@ -111,7 +112,7 @@ pub fn recognise(path: impl AsRef<Path>) -> Result<&'static Format> {
     })
 }
 
-/// [`recognise`] from the start of the file; else a description of what it is.
+/// Like [`recognise`], from the start of a file. The error is a description of the content.
 fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
     if head.bytes.is_empty() {
         return Err("an empty file".to_owned());
@@ -132,7 +133,7 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
         (None, _) => {
             let mut found = "binary data starting 0x".to_owned();
             for byte in head.bytes.iter().take(8) {
-                // Writing to a string does not fail.
+                // Writing to a string cannot fail.
                 let _ = write!(found, "{byte:02x}");
             }
             found
@@ -140,8 +141,8 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
     })
 }
 
-/// The start of a file as text without its byte order mark, if it is text. A character cut at the end is
-/// left out.
+/// The start of a file as text without its byte order mark, if it is text. A character that is cut off at the
+/// end is left out.
 fn as_text(head: &[u8]) -> Option<&str> {
     let text = match std::str::from_utf8(head) {
         Ok(text) => text,

@@ -1,6 +1,6 @@
-//! File formats: bytes to and from what the other rooms hold.
+//! File formats: readers and writers for what the other modules hold.
 //!
-//! A new format is a file with a reader and a constant [`Format`], and a line in [`FORMATS`].
+//! A new format is one file with a reader and a constant [`Format`], and an entry of [`FORMATS`].
 
 mod checksum;
 mod cornell;
@@ -30,7 +30,7 @@ pub use merl::{MERL_BYTES, merl_material_name, read_merl, write_merl, write_merl
 pub use rgl::{RglBrdf, read_rgl};
 pub use source::{Content, Source};
 
-/// The formats that are read, in the order in which they are tried.
+/// The formats that can be read, in the order in which they are tried.
 pub const FORMATS: [&Format; 6] = [
     &rgl::FORMAT,
     &exr::table::FORMAT,

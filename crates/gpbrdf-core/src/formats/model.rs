@@ -1,4 +1,4 @@
-//! Model files; their content is that of [`Model`].
+//! Model files. [`Model`] reads and writes their content.
 
 use crate::formats::format::{Format, Head};
 use crate::formats::source::Content;
@@ -12,7 +12,7 @@ pub(crate) const FORMAT: Format = Format {
     read: |path| Ok(Content::Model(Box::new(Model::load(path)?))),
 };
 
-/// A length of eight bytes that fits into the file, then JSON.
+/// Whether the file starts with a length of eight bytes that fits into the file, followed by JSON.
 fn recognises(head: &Head<'_>) -> bool {
     head.bytes.first_chunk::<8>().zip(head.bytes.get(8)).is_some_and(|(size, &first)| {
         first == b'{' && u64::from_le_bytes(*size) <= head.length.saturating_sub(8)

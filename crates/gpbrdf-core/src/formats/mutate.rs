@@ -1,9 +1,9 @@
-//! Seeded damage to a file's bytes, for tests that no reader panics.
+//! Seeded damage to the bytes of a file, for tests that no reader panics.
 #![allow(clippy::cast_possible_truncation, reason = "random bits may be cut")]
 
 use crate::base::random::SplitMix64;
 
-/// Random integers of the sizes that damage needs.
+/// Random integers of the sizes that [`mutations`] needs.
 pub(crate) struct Random(SplitMix64);
 
 impl Random {
@@ -26,8 +26,8 @@ impl Random {
     }
 }
 
-/// `count` damaged copies of `bytes`: changed bytes, mostly among the first `head`; words set to extremes;
-/// truncations, removed and repeated pieces.
+/// `count` damaged copies of `bytes`. The damage is changed bytes, mostly among the first `head`; words set
+/// to extreme values; truncations; and removed or repeated pieces.
 pub(crate) fn mutations(bytes: &[u8], head: usize, seed: u64, count: usize) -> impl Iterator<Item = Vec<u8>> {
     let mut random = Random::new(seed);
     (0..count).map(move |_| {

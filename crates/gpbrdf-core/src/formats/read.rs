@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::base::error::{Error, Result};
 use crate::brdf::table::cell_indices;
 
-/// Opens `path` for reading, with its length where it is a regular file.
+/// Opens `path` for reading. Returns its length, too, if it is a regular file.
 pub(crate) fn open(path: &Path) -> Result<(File, Option<u64>)> {
     let failed = |source| Error::read(path, source);
     let file = File::open(path).map_err(failed)?;
@@ -38,7 +38,7 @@ pub(crate) fn read_bytes(path: &Path, format: &'static str, limit: u64) -> Resul
     Ok(bytes)
 }
 
-/// Counts values that are not finite in a table, and remembers where the first stands.
+/// Counts the values of a table that are not finite, and remembers the place of the first.
 #[derive(Debug, Default)]
 pub(crate) struct NotFinite {
     count: usize,
@@ -46,7 +46,7 @@ pub(crate) struct NotFinite {
 }
 
 impl NotFinite {
-    /// Counts in the values of one channel from cell `start` on.
+    /// Counts among the values of one channel, the first of which belongs to cell `start`.
     pub(crate) fn count_slice(&mut self, values: impl Iterator<Item = f32>, start: usize, channel: usize) {
         for (offset, value) in values.enumerate() {
             if !value.is_finite() {
@@ -56,7 +56,7 @@ impl NotFinite {
         }
     }
 
-    /// What was found, in words; `None` where all values are finite.
+    /// A description of what was found; `None` if all values are finite.
     pub(crate) fn found(&self) -> Option<String> {
         let (cell, channel) = self.first?;
         let (h, d, p) = cell_indices(cell);
@@ -69,7 +69,7 @@ impl NotFinite {
         ))
     }
 
-    /// An error of kind [`io::ErrorKind::InvalidData`] unless all values of a table are finite.
+    /// Returns an error of kind [`io::ErrorKind::InvalidData`] unless all values of a table are finite.
     pub(crate) fn check(values: &[[f32; 3]]) -> io::Result<()> {
         if values.as_flattened().iter().all(|value| value.is_finite()) {
             return Ok(());

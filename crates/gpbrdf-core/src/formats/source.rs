@@ -1,4 +1,4 @@
-//! Where a BRDF comes from: a file of any kind that is read, or a built-in material.
+//! The source of a BRDF: a file of any format that can be read, or a built-in material.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -12,12 +12,12 @@ use crate::model::Model;
 use crate::model::bake::bake_mean;
 use crate::sample::{Layout, Provenance, SampleSet};
 
-/// Analytic models are defined up to the horizon; this keeps cells at the horizon filled.
+/// Analytic models are evaluated at a cosine of at least this, so that cells at the horizon are filled.
 const ANALYTIC_MIN_COSINE: f64 = 1e-3;
 
 /// What a source holds.
 pub enum Content {
-    /// A MERL or OpenEXR table.
+    /// A table, from a MERL or OpenEXR file.
     Table(BrdfTable),
     /// A BRDF that can be evaluated at any directions: an RGL measurement or an analytic model.
     Function {
@@ -46,26 +46,27 @@ impl std::fmt::Debug for Content {
 /// A BRDF and what is known about its origin.
 #[derive(Debug)]
 pub struct Source {
-    /// Name of the material: the MERL name where the checksum is a published one, else the file's stem or the name of
-    /// the built-in material.
+    /// Name of the material: the MERL name if the checksum is a published one, else the stem of the file's
+    /// name or the name of the built-in material.
     pub name: String,
     /// What the source says about itself.
     pub description: String,
     /// The kind of source, for people, for example `RGL measurement`.
     pub kind: String,
-    /// The file; none for built-in materials.
+    /// The file; `None` for built-in materials.
     pub path: Option<PathBuf>,
-    /// sha256 of the file, hexadecimal; empty for built-in materials.
+    /// SHA-256 sum of the file, hexadecimal; empty for built-in materials.
     pub sha256: String,
-    /// What it holds.
+    /// What the source holds.
     pub content: Content,
 }
 
 impl Source {
-    /// Reads a file; its kind is recognised by content.
+    /// Reads a file; its format is recognised by its content.
     ///
     /// # Errors
-    /// A file that cannot be read, is of no known kind, or is damaged.
+    /// [`Error::Io`] or [`Error::Format`] for a file that cannot be read or is damaged;
+    /// [`Error::UnknownFormat`] for one that has no known format.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let format = recognise(path)?;
@@ -91,10 +92,10 @@ impl Source {
         Ok(source)
     }
 
-    /// A built-in material by name.
+    /// The built-in material called `name`.
     ///
     /// # Errors
-    /// A name that none has.
+    /// [`Error::UnknownName`], which lists the names that exist.
     pub fn built_in(name: &str) -> Result<Self> {
         let found = material(name)?;
         let description = format!("{}; {}", found.description, found.source);
@@ -112,7 +113,7 @@ impl Source {
     /// The source as a BRDF that can be evaluated at any directions.
     ///
     /// # Errors
-    /// Scattered samples, which say nothing between them.
+    /// [`Error::Unsuitable`] for scattered samples, which do not define values between them.
     pub fn brdf(&self) -> Result<&dyn Brdf> {
         match &self.content {
             Content::Table(table) => Ok(table),
@@ -122,10 +123,10 @@ impl Source {
         }
     }
 
-    /// The source as a table, baked or tabulated where it is none.
+    /// The source as a table: a table as it is, a function tabulated, a model baked.
     ///
     /// # Errors
-    /// Scattered samples.
+    /// [`Error::Unsuitable`] for scattered samples.
     pub fn table(&self) -> Result<Cow<'_, BrdfTable>> {
         match &self.content {
             Content::Table(table) => Ok(Cow::Borrowed(table)),
@@ -135,7 +136,7 @@ impl Source {
         }
     }
 
-    /// What it says where a BRDF is needed and the source is scattered samples.
+    /// The error for scattered samples where a BRDF is needed.
     fn scattered(&self) -> Error {
         Error::Unsuitable {
             what: self.origin(),
@@ -147,7 +148,7 @@ impl Source {
     /// The scattered measurements of the source.
     ///
     /// # Errors
-    /// A source that is no set of samples.
+    /// [`Error::Unsuitable`] for a source that is not a set of samples.
     pub fn samples(&self) -> Result<&SampleSet> {
         match &self.content {
             Content::Samples(samples) => Ok(samples),
@@ -159,10 +160,10 @@ impl Source {
         }
     }
 
-    /// Evaluates the source at the directions of a layout; the samples know where they come from.
+    /// Evaluates the source at the directions of a layout. The samples record where they come from.
     ///
     /// # Errors
-    /// Scattered samples, or a broken layout.
+    /// [`Error::Unsuitable`] for scattered samples, [`Error::InvalidArgument`] for an invalid layout.
     pub fn measure(&self, layout: &Layout) -> Result<SampleSet> {
         let samples = SampleSet::measure(self.brdf()?, layout)?;
         let Provenance { layout, lattice, .. } = samples.origin;
@@ -170,7 +171,7 @@ impl Source {
         Ok(SampleSet { description: self.description.clone(), origin, ..samples })
     }
 
-    /// Name, file and checksum, for what is made of the source.
+    /// Name, file and checksum of the source, to be recorded in whatever is made from it.
     #[must_use]
     pub fn provenance(&self) -> Provenance {
         Provenance {
@@ -181,7 +182,7 @@ impl Source {
         }
     }
 
-    /// The file's path or `built-in NAME`, for reports.
+    /// The path of the file, or `built-in NAME`, for reports.
     #[must_use]
     pub fn origin(&self) -> String {
         self.path

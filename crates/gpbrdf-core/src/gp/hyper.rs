@@ -6,6 +6,12 @@ use crate::base::error::{Error, Result};
 use crate::gp::solver::Solver;
 use crate::kernel::{Kernel, KernelBody, ParameterKind};
 
+/// The smallest ratio of noise to signal variance, which keeps the covariance positive definite in f64.
+pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
+
+/// The names along the three axes of the warped box.
+pub(crate) const AXIS_NAMES: [&str; 3] = ["u", "v", "phi"];
+
 /// The hyper-parameters of a process whose channels share them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hyper {

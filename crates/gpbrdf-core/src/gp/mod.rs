@@ -1,8 +1,12 @@
 //! Gaussian processes: exact on any points and on product lattices, and sparse on an inducing lattice.
 
 mod hyper;
+#[cfg(feature = "fit")]
 mod optimize;
 mod posterior;
+#[cfg(feature = "fit")]
+pub(crate) mod problem;
+#[cfg(feature = "fit")]
 mod report;
 pub(crate) mod solver;
 pub(crate) mod table;
@@ -12,18 +16,28 @@ pub(crate) mod dense;
 pub(crate) mod inducing;
 pub(crate) mod lattice;
 
+pub use dense::DenseGp;
 pub use dense::cost::{DenseCost, dense_cost};
-pub use dense::fit::DenseFit;
-pub use dense::{DenseEvaluator, DenseGp, DenseLikelihood, LeaveOneOut};
 pub use hyper::{Hyper, HyperKind, HyperParameter};
-pub(crate) use inducing::fit::{Budget, GridData, fit_inducing};
 pub use inducing::{InducingComponent, InducingGp, InducingShape};
-pub use lattice::fit::fit_lattice;
 pub(crate) use lattice::kronecker::apply as contract;
-pub use lattice::{AxisBasis, LatticeData, LatticeGp, LatticeHyper, LatticeLikelihood, SeparableForm};
-pub use optimize::{OptimizeOptions, Optimum, Parameter, maximize};
+pub use lattice::{AxisBasis, LatticeData, LatticeGp, LatticeHyper, SeparableForm};
 pub use posterior::{DeviceForm, KernelSum, Posterior, SeparablePart};
-pub use report::{FitReport, Noise};
-pub use solver::{Observer, Solver};
+pub use solver::Solver;
 pub use table::{MeanTable, TableGeometry};
 pub use tensors::{TensorReader, TensorWriter};
+
+#[cfg(feature = "fit")]
+pub use dense::fit::DenseFit;
+#[cfg(feature = "fit")]
+pub use dense::{DenseEvaluator, DenseLikelihood, LeaveOneOut};
+#[cfg(feature = "fit")]
+pub(crate) use inducing::fit::{Budget, GridData, fit_inducing};
+#[cfg(feature = "fit")]
+pub use lattice::{LatticeLikelihood, fit::fit_lattice};
+#[cfg(feature = "fit")]
+pub use optimize::{OptimizeOptions, Optimum, Parameter, maximize};
+#[cfg(feature = "fit")]
+pub use problem::Observer;
+#[cfg(feature = "fit")]
+pub use report::{FitReport, Noise};

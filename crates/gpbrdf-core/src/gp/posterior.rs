@@ -1,7 +1,6 @@
 //! The one door to every solver: what a model needs of a conditioned process.
 
 use std::fmt::Debug;
-use std::sync::Arc;
 
 use serde_json::Value;
 
@@ -9,7 +8,6 @@ use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
 use crate::gp::hyper::Hyper;
 use crate::gp::lattice::LatticeGp;
-use crate::gp::report::FitReport;
 use crate::gp::table::{self, MeanTable};
 use crate::gp::tensors::TensorWriter;
 use crate::kernel::Kernel;
@@ -89,9 +87,6 @@ pub trait Posterior: Debug + Send + Sync {
         table::points::bake_sigma(self)
     }
 }
-
-/// A posterior and how the search for its hyper-parameters went.
-pub(crate) type Fitted = (Arc<dyn Posterior>, FitReport);
 
 /// The two forms of a posterior that a graphics device evaluates.
 #[derive(Debug)]

@@ -25,9 +25,3 @@ pub struct FitReport {
     /// Hyper-parameters that ended at a bound of their range.
     pub at_bound: Vec<String>,
 }
-
-/// The smallest ratio of noise to signal variance, which keeps the covariance positive definite in f64.
-pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
-
-/// The names along the three axes of the warped box.
-pub(crate) const AXIS_NAMES: [&str; 3] = ["u", "v", "phi"];

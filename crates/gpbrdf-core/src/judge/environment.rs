@@ -1,8 +1,9 @@
 //! Light from all around: latitude-longitude maps in linear RGB.
 //!
-//! Convention: right-handed, `+y` up. A pixel at `u` (left to right) and `v` (top to bottom), both in `[0, 1]`,
-//! stands for the direction `(sin t sin p, cos t, -sin t cos p)` with `t = pi v` and `p = 2 pi (u - 1/2)`: the
-//! middle of the map looks along `-z`, its right quarter along `+x`, its edges along `+z`.
+//! Convention: right-handed, `+y` up. A pixel at `u` (left to right) and `v` (top to bottom), both in
+//! `[0, 1]`, is in the direction `(sin t sin p, cos t, -sin t cos p)` with `t = pi v` and
+//! `p = 2 pi (u - 1/2)`: the middle of the map is at `-z`, the middle of its right half at `+x`, its left and
+//! right edges at `+z`.
 
 use std::f64::consts::{PI, TAU};
 
@@ -19,7 +20,7 @@ pub struct Environment {
     pixels: Vec<[f32; 3]>,
 }
 
-/// One patch of an [`Environment`].
+/// One rectangular patch of an [`Environment`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvDirection {
     /// Unit direction towards the middle of the patch.
@@ -37,7 +38,8 @@ struct SoftLight {
     peak: Rgb,
 }
 
-/// Key, fill and rim light. Half of the peak is left at `acos(1 - ln 2 / sharpness)`: 9, 28 and 13 degrees.
+/// Key, fill and rim light. They fall to half of the peak at an angle of `acos(1 - ln 2 / sharpness)`: 9, 28
+/// and 13 degrees.
 const STUDIO_LIGHTS: [SoftLight; 3] = [
     SoftLight { axis: [-0.55, 0.65, 0.60], sharpness: 60.0, peak: [50.0, 44.0, 36.0] },
     SoftLight { axis: [0.85, 0.10, 0.45], sharpness: 6.0, peak: [1.2, 1.6, 2.4] },
@@ -51,8 +53,8 @@ impl Environment {
     /// A map of `width * height` pixels, rows from top to bottom.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] when a side is 0, the number of pixels is not `width * height`, or a value is
-    /// negative or not finite.
+    /// [`Error::InvalidArgument`] when a side is 0, the number of pixels is not `width * height`, or a value
+    /// is negative or not finite.
     pub fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self> {
         if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
             let expected = format!("{width} x {height} pixels, at least one");
@@ -65,12 +67,12 @@ impl Environment {
         Ok(Self { width, height, pixels })
     }
 
-    /// The environment of the image metrics: a studio made by formula, 192 x 96 pixels.
+    /// The environment of the image metrics: a studio given by a formula, 192 x 96 pixels.
     ///
     /// With `d` the direction and `s = smoothstep(-0.08, 0.08, d.y)`, the radiance is
     /// `(1 - s) floor + s (horizon + (zenith - horizon) sqrt(max(d.y, 0)))` plus three soft lights
-    /// `peak exp(sharpness (d . axis - 1))`: a warm key light above to the left of the viewer, who looks along
-    /// `-z` (peak 50), a broad cool fill light from the right, and a cool rim light from behind.
+    /// `peak exp(sharpness (d . axis - 1))`: a warm key light above to the left of the viewer, who looks
+    /// along `-z` (peak 50), a broad cool fill light from the right, and a cool rim light from behind.
     #[must_use]
     pub fn studio() -> Self {
         let (width, height) = (192, 96);
@@ -102,8 +104,9 @@ impl Environment {
         &self.pixels
     }
 
-    /// The map as `columns x rows` patches, row by row: each patch's mean radiance, weighted by solid angle,
-    /// with pixels that straddle an edge shared out. The flux `sum radiance solid_angle` stays what it was.
+    /// The map as `columns x rows` patches, row by row. The radiance of a patch is the mean over its pixels,
+    /// weighted by solid angle; a pixel on an edge is shared between patches. The flux
+    /// `sum radiance solid_angle` is unchanged.
     #[must_use]
     pub fn average_to(&self, columns: usize, rows: usize) -> Vec<EnvDirection> {
         let across: Vec<_> = (0..columns).map(|i| overlaps(i, columns, self.width)).collect();
@@ -140,7 +143,7 @@ impl Environment {
     }
 }
 
-/// The direction at `(u, v)`; the module states the convention.
+/// The direction at `(u, v)`, by the convention of this module.
 fn lat_long(u: f64, v: f64) -> Vector3<f64> {
     let (sin_t, cos_t) = (PI * v).sin_cos();
     let (sin_p, cos_p) = (TAU * (u - 0.5)).sin_cos();
@@ -165,10 +168,10 @@ fn studio_radiance(d: &Vector3<f64>) -> Rgb {
     })
 }
 
-/// The cells of an axis of `source` cells that cell `i` of `target` cells covers, each with the two ends of the
-/// common part, in units of the whole axis.
+/// The cells of an axis of `source` cells that overlap cell `i` of an axis of `target` cells. Each comes with
+/// both ends of the overlap, in units of the whole axis.
 fn overlaps(i: usize, target: usize, source: usize) -> Vec<(usize, f64, f64)> {
-    // In integers of 1 / (target source), so that shared edges are exact.
+    // Positions are multiples of 1 / (target source), held as integers, so that shared edges are exact.
     let (begin, end) = (i * source, (i + 1) * source);
     let whole = (target * source) as f64;
     (begin / target..end.div_ceil(target))
@@ -191,7 +194,7 @@ mod tests {
 
     #[test]
     fn patches_fill_the_sphere_and_keep_the_flux() {
-        // 50 x 23 pixels divide neither 48 nor 24.
+        // 50 x 23 pixels are divided evenly by neither 48 columns nor 24 rows.
         let pixels = (0..50 * 23).map(|i| [(i % 7) as f32, (i % 50) as f32, (i / 50) as f32]).collect();
         let map = Environment::new(50, 23, pixels).unwrap();
         let patches = map.average_to(48, 24);

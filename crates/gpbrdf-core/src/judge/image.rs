@@ -1,8 +1,8 @@
-//! Pictures in linear light, and which of their pixels count.
+//! Pictures in linear light, with a mask of the pixels that metrics compare.
 
 use crate::base::error::{Error, Result};
 
-/// A picture of the sphere in linear RGB; black outside of it. Rows from top to bottom.
+/// A picture of the sphere in linear RGB, black outside of it. Rows are ordered from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
     pub(super) width: usize,
@@ -12,7 +12,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// An image of `width * height` pixels, of which those in `mask` count.
+    /// An image of `width * height` pixels; metrics compare those in `mask`.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] unless there are `width * height` pixels and as many entries in the mask.
@@ -43,13 +43,13 @@ impl Image {
         &self.pixels
     }
 
-    /// Which pixels are the sphere's.
+    /// The mask of the pixels that belong to the sphere.
     #[must_use]
     pub fn mask(&self) -> &[bool] {
         &self.mask
     }
 
-    /// The sphere's pixels only.
+    /// Only the pixels of the sphere.
     pub fn sphere_pixels(&self) -> impl Iterator<Item = &[f32; 3]> {
         self.pixels.iter().zip(&self.mask).filter_map(|(pixel, &inside)| inside.then_some(pixel))
     }

@@ -1,4 +1,4 @@
-//! How two pictures of the sphere differ.
+//! Comparison of two pictures of the sphere.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -7,13 +7,13 @@ use crate::brdf::Rgb;
 use crate::judge::Image;
 use crate::judge::ssim::mean_ssim;
 
-/// The exposed value of the truth's 90th percentile.
+/// The value that exposure gives to the 90th percentile of the truth.
 const EXPOSED_PERCENTILE: f64 = 0.6;
 
-/// Comparison of the sphere pictures of a truth and a prediction.
+/// Comparison of the sphere pictures of a truth and of a prediction.
 ///
-/// PSNRs are in dB and infinite for equal pictures. JSON has no infinity: it is written as the string `"inf"`,
-/// which `float("inf")` and Rust's `parse` read back, and so does this type.
+/// PSNRs are in dB, and infinite for equal pictures. JSON has no infinity: it is written as the string
+/// `"inf"`, which this type, `float("inf")` in Python and Rust's `parse` read back.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageMetrics {
     /// [`psnr`] under the environment.
@@ -24,13 +24,13 @@ pub struct ImageMetrics {
     pub psnr_point: f64,
     /// [`ssim`] under the environment.
     pub ssim_env: f64,
-    /// The paper's pixel difference, under the point light.
+    /// The paper's pixel difference under the point light.
     pub pixel_difference: PixelDifference,
 }
 
 impl ImageMetrics {
-    /// Compares pictures under the environment and under the point light, each pair `(truth, prediction)`, with
-    /// the exposures of [`exposure_of`] the truths.
+    /// Compares pictures under the environment and under the point light, each given as a pair
+    /// `(truth, prediction)`. Each pair is exposed by [`exposure_of`] its truth.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] when two pictures differ in size.
@@ -45,8 +45,8 @@ impl ImageMetrics {
     }
 }
 
-/// Distribution of `|1 - b / a|` over the sphere's pixels and channels, `a` the truth's linear radiance and `b`
-/// the prediction's, where `a > 0`.
+/// Distribution of `|1 - b / a|` over the sphere's pixels and channels with `a > 0`, where `a` is the linear
+/// radiance of the truth and `b` that of the prediction.
 ///
 /// Source: the paper, section 5 and figure 5 (e), which finds it below 5 % under a point light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ pub struct PixelDifference {
 }
 
 impl PixelDifference {
-    /// Compares two pictures; all zero, with a share of 1, where the truth is black.
+    /// Compares two pictures. Where the truth is black, all values are zero and the share is 1.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] when they differ in size.
@@ -87,15 +87,17 @@ impl PixelDifference {
     }
 }
 
-/// The difference that pictures show: prediction minus truth, exposed linear values before clipping, averaged over R, G
-/// and B. 1 is the white of the picture; positive values, drawn red, are too bright.
+/// The difference that is shown in pictures: prediction minus truth, in linear values that are exposed but
+/// not clipped, averaged over R, G and B. 1 is the white of the picture. Positive values are drawn red: the
+/// prediction is too bright.
 #[must_use]
 pub fn exposed_difference(prediction: Rgb, truth: Rgb, exposure: f64) -> f64 {
     exposure * (0..3).map(|c| prediction[c] - truth[c]).sum::<f64>() / 3.0
 }
 
-/// The factor that brings the 90th percentile over the sphere's pixels and channels to 0.6 (linear interpolation
-/// between order statistics); 1 where that percentile is 0.
+/// The exposure of a picture: the factor that brings the 90th percentile over the sphere's pixels and
+/// channels to 0.6. The percentile is interpolated linearly between order statistics; the factor is 1 if
+/// the percentile is 0.
 #[must_use]
 pub fn exposure_of(truth: &Image) -> f64 {
     let mut values: Vec<f64> = truth.sphere_pixels().flatten().map(|&x| f64::from(x)).collect();
@@ -104,8 +106,8 @@ pub fn exposure_of(truth: &Image) -> f64 {
     if level > 0.0 && level.is_finite() { EXPOSED_PERCENTILE / level } else { 1.0 }
 }
 
-/// Peak signal-to-noise ratio in dB: `-10 log10 mean (a - b)^2` over the sphere's pixels and channels, with
-/// linear RGB times `exposure` clipped to `[0, 1]`. Infinite for equal pictures.
+/// Peak signal-to-noise ratio in dB: `-10 log10 mean (a - b)^2` over the sphere's pixels and channels, where
+/// `a` and `b` are linear RGB times `exposure`, clipped to `[0, 1]`. Infinite for equal pictures.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] when the pictures differ in size.
@@ -123,8 +125,8 @@ pub fn psnr(truth: &Image, prediction: &Image, exposure: f64) -> Result<f64> {
     Ok(-10.0 * (sum / count as f64).log10())
 }
 
-/// Mean structural similarity over the sphere's pixels, averaged over R, G and B, of the pictures as shown:
-/// times `exposure`, clipped to `[0, 1]`, raised to 1/2.2; black outside of the sphere.
+/// Mean structural similarity over the sphere's pixels, averaged over R, G and B. It compares the pictures as
+/// shown: times `exposure`, clipped to `[0, 1]`, raised to 1/2.2, and black outside of the sphere.
 ///
 /// Source: Wang et al. 2004, 11 x 11 Gaussian window of standard deviation 1.5.
 ///
@@ -141,7 +143,7 @@ pub fn ssim(truth: &Image, prediction: &Image, exposure: f64) -> Result<f64> {
     Ok(sum / 3.0)
 }
 
-/// The value below which a share `p` of `sorted` lies, linear between order statistics; 0 for an empty slice.
+/// The value below which a share `p` of `sorted` is, linear between order statistics; 0 for an empty slice.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "p is in [0, 1]")]
 pub(crate) fn percentile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
@@ -149,16 +151,16 @@ pub(crate) fn percentile(sorted: &[f64], p: f64) -> f64 {
     let low = (at as usize).min(last);
     let high = (low + 1).min(last);
     let t = at - low as f64;
-    // Not a + t (b - a), which is NaN between infinities.
+    // Not computed as a + t (b - a), which is NaN between infinities.
     if t == 0.0 { sorted[low] } else { (1.0 - t) * sorted[low] + t * sorted[high] }
 }
 
-/// Clips to `[0, 1]`; NaN stays.
+/// Clips to `[0, 1]`; NaN stays NaN.
 fn clip(x: f64) -> f64 {
     x.clamp(0.0, 1.0)
 }
 
-/// The channels of the sphere's pixels in both pictures.
+/// The channels of the sphere's pixels, as pairs of both pictures.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> impl Iterator<Item = (f64, f64)> + 'a {
     let both = a.pixels().iter().zip(b.pixels()).zip(a.mask());
     both.filter(|(_, inside)| **inside)
@@ -173,7 +175,8 @@ fn same_size(a: &Image, b: &Image) -> Result<()> {
     Err(Error::argument("predicted image", expected, format!("{} x {}", b.width(), b.height())))
 }
 
-/// A number in JSON, or its name as a string where JSON has none: `"inf"`, `"-inf"`, `"NaN"`.
+/// The form of a number in JSON: the number, or its name as a string where JSON has none: `"inf"`, `"-inf"`,
+/// `"NaN"`.
 pub(crate) mod decibel {
     use super::{Deserialize, Deserializer, Serializer};
 
@@ -204,7 +207,7 @@ pub(crate) mod decibel {
 mod tests {
     use super::*;
 
-    /// A disc of `size` pixels across.
+    /// A disc that is `size` pixels wide.
     fn picture(size: usize, f: impl Fn(usize) -> [f32; 3]) -> Image {
         let mask = (0..size * size)
             .map(|i| {
@@ -223,7 +226,7 @@ mod tests {
         assert!((psnr(&a, &b, 1.0).unwrap() - 40.0).abs() < 1e-4);
         assert!((psnr(&a, &b, 0.5).unwrap() - 40.0 - 20.0 * 2.0f64.log10()).abs() < 1e-4);
         assert_eq!(psnr(&a, &b, 4.0).unwrap(), f64::INFINITY);
-        // Outside of the mask nothing counts.
+        // Pixels outside of the mask are not compared.
         let c = picture(40, |i| if i == 0 { [9.0; 3] } else { [0.5; 3] });
         assert_eq!(psnr(&a, &c, 1.0).unwrap(), f64::INFINITY);
         assert!(psnr(&a, &picture(41, |_| [0.0; 3]), 1.0).is_err());

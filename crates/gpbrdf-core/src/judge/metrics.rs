@@ -1,4 +1,4 @@
-//! How a table differs from the truth, in numbers that can be quoted.
+//! Comparison of a table with the truth, in numbers that can be quoted.
 
 use std::array::from_fn;
 
@@ -13,10 +13,10 @@ use crate::judge::image_metrics::{ImageMetrics, decibel};
 use crate::judge::sphere::{SPHERE_SIZE, render_env, render_point};
 use crate::sample::LOG_EPSILON;
 
-/// The 95 % interval of a cell: its lower and upper end in each channel, sr^-1.
+/// The 95 % interval of the cell with this index: its lower and upper end in each channel, sr^-1.
 pub type Interval<'a> = dyn Fn(usize) -> ([f64; 3], [f64; 3]) + Sync + 'a;
 
-/// All metrics of a prediction against a truth; one flat object in JSON.
+/// All metrics of a prediction against a truth. In JSON they are one flat object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Comparison cell by cell.
@@ -28,13 +28,13 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Compares two tables, with sphere pictures under `environment` and under the point light, and the coverage
-    /// of `interval`, which gets the index of a cell.
+    /// Compares two tables: cell by cell, in sphere pictures under `environment` and under the point light,
+    /// and by the coverage of `interval`, if it is given.
     ///
     /// Parallel; the result does not depend on the number of threads.
     ///
     /// # Errors
-    /// Those of [`CellMetrics::new`].
+    /// The errors of [`CellMetrics::new`].
     pub fn new(
         truth: &BrdfTable,
         prediction: &BrdfTable,
@@ -52,12 +52,12 @@ impl Metrics {
 
 /// Comparison of a prediction `f^` with a truth `f`, cell by cell, unweighted.
 ///
-/// It sees the valid cells: those whose centre is above the horizon and where the truth has data. The
-/// logarithmic metrics see those of them in which both cosines exceed 0.08. A negative prediction counts as it
-/// stands in `mae` and `mse`, and as 0 in the logarithmic metrics.
+/// The valid cells are compared: those whose centre is above the horizon and where the truth has data. The
+/// logarithmic metrics compare only valid cells in which both cosines exceed 0.08. A negative prediction is
+/// taken as it is in `mae` and `mse`, and as 0 in the logarithmic metrics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CellMetrics {
-    /// Number of valid cells; 1,096,216 for a truth without gaps.
+    /// Number of valid cells: 1,096,216 for a truth without gaps.
     pub valid_cells: usize,
     /// Mean of `|f^ - f|` over cells and channels, sr^-1. The paper, eq. 18.
     pub mae: f64,
@@ -79,11 +79,13 @@ pub struct CellMetrics {
     pub log1p_cos_l1: f64,
     /// `log1p_cos_l1` of each channel.
     pub log1p_cos_l1_rgb: [f64; 3],
-    /// `10 log10(255^2 / mse)`, dB: what the PSNR column of the paper's table 2 holds. It says no more than
-    /// `mse` does; not to be ranked against the PSNR of images. Infinite (`"inf"` in JSON) for equal tables.
+    /// `10 log10(255^2 / mse)`, dB, the quantity in the PSNR column of the paper's table 2. It is a function
+    /// of `mse` alone and cannot be compared with the PSNR of images. Infinite (`"inf"` in JSON) for equal
+    /// tables.
     #[serde(with = "decibel")]
     pub psnr_paper_table2: f64,
-    /// Share of valid cells and channels in which the truth lies within the 95 % interval; absent without one.
+    /// Share of valid cells and channels in which the truth is within the 95 % interval; `None` without
+    /// intervals.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coverage_95: Option<f64>,
     /// `coverage_95` of each channel.
@@ -91,7 +93,7 @@ pub struct CellMetrics {
     pub coverage_95_rgb: Option<[f64; 3]>,
 }
 
-/// Sums over the cells of one `theta_h`.
+/// Sums over the cells with the same `theta_h`.
 #[derive(Default)]
 struct Sums {
     valid: usize,
@@ -101,17 +103,19 @@ struct Sums {
     log1p: [f64; 3],
     covered: [usize; 3],
     logs: [Vec<f32>; 3],
-    /// The first cell whose prediction is not finite.
+    /// The first cell in which the prediction is not finite.
     broken: Option<usize>,
 }
 
 impl CellMetrics {
-    /// Compares two tables, and the truth with `interval`, which gets the index of a cell.
+    /// Compares two tables, and the truth with `interval`, if it is given.
     ///
-    /// Parallel over `theta_h`, summed in a fixed order: the result does not depend on the number of threads.
+    /// Parallel over `theta_h` and summed in a fixed order: the result does not depend on the number of
+    /// threads.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] when the truth has no valid cell, or the prediction is not finite in one.
+    /// [`Error::InvalidArgument`] when the truth has no valid cell, or the prediction is not finite in a
+    /// valid cell.
     pub fn new(truth: &BrdfTable, prediction: &BrdfTable, interval: Option<&Interval<'_>>) -> Result<Self> {
         // Sine and cosine of each theta_d, and the cosine of each phi_d.
         let thetas: Vec<(f64, f64)> =
@@ -151,7 +155,7 @@ fn sum_row(
     let (sin_h, cos_h) = cell_center(h, 0, 0).theta_h.sin_cos();
     for (d, &(sin_d, cos_d)) in thetas.iter().enumerate() {
         for (p, cos_p) in phis.iter().enumerate() {
-            // As HalfDiff::cosines, to the last bit.
+            // Equal to HalfDiff::cosines to the last bit.
             let skew = sin_h * sin_d * cos_p;
             let (cos_i, cos_o) = (cos_h * cos_d - skew, cos_h * cos_d + skew);
             let cell = cell_index(h, d, p);
@@ -210,10 +214,10 @@ impl Sums {
         }
     }
 
-    /// The metrics; there is at least one valid cell.
+    /// The metrics, if there is at least one valid cell.
     fn finish(self, has_interval: bool) -> CellMetrics {
         let valid = self.valid as f64;
-        // Valid cells may all be grazing: then the logarithmic metrics see none, and are 0.
+        // All valid cells may be grazing. The logarithmic metrics then compare no cell, and are 0.
         let lit = self.logs[0].len().max(1) as f64;
         let mean = |x: [f64; 3]| (x[0] + x[1] + x[2]) / 3.0;
         let mae_rgb = self.absolute.map(|x| x / valid);
@@ -246,7 +250,7 @@ impl Sums {
     }
 }
 
-/// The median, the mean of the middle two of an even number; 0 of nothing. Reorders the values.
+/// The median; for an even number of values the mean of the middle two, for none 0. Reorders the values.
 pub(super) fn median(values: &mut [f32]) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -272,7 +276,7 @@ mod tests {
         ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Random values, a tenth of the cells without data.
+    /// Random values; with `gaps`, a tenth of the cells has no data.
     fn random_table(seed: u64, gaps: bool) -> BrdfTable {
         let values = (0..crate::brdf::table::N_CELLS).map(|i| {
             if gaps && noise(i, seed + 7) < 0.1 {

@@ -1,4 +1,4 @@
-//! How well a prediction meets a truth: cell by cell, and in pictures of a lit sphere.
+//! Comparison of a prediction with a truth: cell by cell, and in pictures of a lit sphere.
 
 mod environment;
 mod image;

@@ -1,4 +1,4 @@
-//! How predictions differ from measurements at their directions, in numbers that can be quoted.
+//! Comparison of predictions with measurements at the same directions, in numbers that can be quoted.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,8 +8,8 @@ use crate::judge::metrics::median;
 use crate::model::Prediction;
 use crate::sample::log_value;
 
-/// Comparison of predictions with measured values, one by one and unweighted. The logarithmic metrics take negative
-/// values for 0.
+/// Comparison of predictions with measured values, one by one and unweighted. The logarithmic metrics take
+/// negative values as 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SampleMetrics {
     /// Number of measurements.
@@ -22,15 +22,15 @@ pub struct SampleMetrics {
     pub log_rmse: f64,
     /// Median over measurements and channels of `|ln(f^ + 1e-3) - ln(f + 1e-3)|`.
     pub median_abs_log: f64,
-    /// Share of measurements and channels within the predicted 95 % interval.
+    /// Share of measurements and channels that are within the predicted 95 % interval.
     pub coverage_95: f64,
 }
 
 impl SampleMetrics {
-    /// Compares `values`, sr^-1, with the predictions at their directions.
+    /// Compares `values`, sr^-1, with the predictions at the same directions.
     ///
     /// # Errors
-    /// No values, or another number of predictions.
+    /// [`Error::InvalidArgument`] if there are no values, or not as many predictions as values.
     pub fn new(values: &[Rgb], predictions: &[Prediction]) -> Result<Self> {
         if values.is_empty() || values.len() != predictions.len() {
             let found = format!("{} and {}", values.len(), predictions.len());

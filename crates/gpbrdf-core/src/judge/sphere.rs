@@ -1,14 +1,15 @@
-//! A sphere seen from afar: the renderer behind the image metrics and the sphere pictures.
+//! A sphere seen from afar: the renderer of the image metrics and of the sphere pictures.
 //!
-//! Camera space: `x` right, `y` up, `z` towards the viewer, who is at infinity, so that `wo = +z` everywhere and
-//! the pixel at `(x, y)` of the unit disc has the normal `(x, y, sqrt(1 - x^2 - y^2))`. The sphere touches the
-//! edges of the frame. A pixel belongs to the sphere when its centre does.
+//! Camera space: `x` right, `y` up, `z` towards the viewer. The viewer is at infinity, so that `wo = +z`
+//! everywhere and the pixel at `(x, y)` of the unit disc has the normal `(x, y, sqrt(1 - x^2 - y^2))`. The
+//! sphere touches the edges of the frame. A pixel belongs to the sphere if its centre does.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 use crate::brdf::angles::GRAZING_COSINE;
 use crate::brdf::angles::HalfDiff;
@@ -18,12 +19,12 @@ use crate::judge::image::Image;
 
 /// Rows and columns of the images that the metrics compare.
 pub const SPHERE_SIZE: usize = 96;
-/// Columns and rows of the patches to which an environment is averaged.
+/// Columns and rows of the patches over which an environment is averaged.
 pub const ENV_PATCHES: (usize, usize) = (48, 24);
-/// Towards the light of [`render_point`], in camera space, before normalisation.
+/// Direction to the light of [`render_point`] in camera space, before normalisation.
 pub const POINT_LIGHT: [f64; 3] = [1.0, 1.0, 1.5];
 
-/// Rows and columns of the pixels shaded together.
+/// Rows and columns of a tile of pixels that are shaded together.
 const TILE: usize = 8;
 
 /// Light from one direction.
@@ -35,7 +36,7 @@ pub struct DistantLight {
     pub irradiance: Rgb,
 }
 
-/// The lights that stand for an environment: one for each of `patches` (columns, rows) that is not black.
+/// The lights that represent an environment: one for each of `patches` (columns, rows) that is not black.
 #[must_use]
 pub fn environment_lights(environment: &Environment, patches: (usize, usize)) -> Vec<DistantLight> {
     environment
@@ -49,20 +50,20 @@ pub fn environment_lights(environment: &Environment, patches: (usize, usize)) ->
         .collect()
 }
 
-/// The sphere of each table under `environment`, whose directions are those of camera space:
+/// The sphere of each table under `environment`, whose directions are taken as directions of camera space:
 /// `L = sum_k radiance_k f(wi_k, wo) cos theta_k solid_angle_k` over [`ENV_PATCHES`].
 ///
-/// `f` is the trilinear lookup; a direction with a cosine under [`GRAZING_COSINE`] adds nothing. The tables share
-/// the lookups' geometry. `size` is the number of rows and of columns. Parallel over tiles; the result does not
-/// depend on the number of threads. About 4 million lookups at `size` 96.
+/// `f` is looked up trilinearly, and all tables share the geometry of a lookup. Directions with a cosine
+/// below [`GRAZING_COSINE`] add nothing. `size` is the number of rows and of columns. Parallel over tiles;
+/// the result does not depend on the number of threads. Cost: about 4 million lookups at a `size` of 96.
 #[must_use]
 pub fn render_env(tables: &[&BrdfTable], environment: &Environment, size: usize) -> Vec<Image> {
     let lights = environment_lights(environment, ENV_PATCHES);
     render(tables, &lights, size)
 }
 
-/// The sphere of each table under one white light at infinity towards [`POINT_LIGHT`], of irradiance pi: a white
-/// Lambertian surface that faces it has radiance 1.
+/// The sphere of each table under one white light at infinity in the direction [`POINT_LIGHT`]. Its
+/// irradiance is pi, so that a white Lambertian surface that faces it has radiance 1.
 #[must_use]
 pub fn render_point(tables: &[&BrdfTable], size: usize) -> Vec<Image> {
     let light = DistantLight { direction: Vector3::from(POINT_LIGHT).normalize(), irradiance: [PI; 3] };
@@ -70,24 +71,28 @@ pub fn render_point(tables: &[&BrdfTable], size: usize) -> Vec<Image> {
 }
 
 fn render(tables: &[&BrdfTable], lights: &[DistantLight], size: usize) -> Vec<Image> {
+    // Without cancellation there is no error.
     render_sphere(tables, lights, size, &|| false).unwrap_or_default()
 }
 
-/// The sphere of each table under any lights, as [`render_env`] makes it; `None` as soon as `cancelled`, which is asked
-/// once a tile, says so.
+/// The sphere of each table under any lights, computed like [`render_env`]. `cancelled` is called once per
+/// tile.
+///
+/// # Errors
+/// [`Error::Cancelled`] as soon as `cancelled` returns true.
 pub fn render_sphere(
     tables: &[&BrdfTable],
     lights: &[DistantLight],
     size: usize,
     cancelled: &(dyn Fn() -> bool + Sync),
-) -> Option<Vec<Image>> {
+) -> Result<Vec<Image>> {
     let center = |i: usize| 2.0 * (i as f64 + 0.5) / size as f64 - 1.0;
     let tiles = size.div_ceil(TILE);
-    let shaded: Option<Vec<Shaded>> = (0..tiles * tiles)
+    let shaded: Result<Vec<Shaded>> = (0..tiles * tiles)
         .into_par_iter()
         .map(|tile| {
             if cancelled() {
-                return None;
+                return Err(Error::Cancelled);
             }
             let (left, top) = (tile % tiles * TILE, tile / tiles * TILE);
             let mut pixels = Vec::with_capacity(TILE * TILE);
@@ -97,7 +102,7 @@ pub fn render_sphere(
                     pixels.extend(frame.map(|frame| (row * size + column, frame)));
                 }
             }
-            Some(shade(tables, lights, &pixels))
+            Ok(shade(tables, lights, &pixels))
         })
         .collect();
     let shaded = shaded?;
@@ -114,13 +119,14 @@ pub fn render_sphere(
         }
         Image { width: size, height: size, pixels, mask: mask.clone() }
     });
-    Some(images.collect())
+    Ok(images.collect())
 }
 
-/// The local frame of a point that is shaded: the normal is `+z`, and the viewer is in the plane of `x` and `z`.
+/// The local frame of a point to be shaded: the normal is `+z`, and the viewer is in the plane of `x` and
+/// `z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingFrame {
-    /// Towards the projected viewer.
+    /// Tangent towards the viewer: the local x axis.
     e: Vector3<f64>,
     f: Vector3<f64>,
     normal: Vector3<f64>,
@@ -129,8 +135,8 @@ pub struct ShadingFrame {
 }
 
 impl ShadingFrame {
-    /// The frame of a surface with a unit normal, seen from the unit direction `to_viewer`. None where the cosine between
-    /// them is not positive or under `min_cosine`: the viewer sees black there.
+    /// The frame of a surface with a unit normal, seen from the unit direction `to_viewer`. `None` if the
+    /// cosine between them is not positive or is below `min_cosine`: such a surface is shown black.
     #[must_use]
     pub fn new(normal: &Vector3<f64>, to_viewer: &Vector3<f64>, min_cosine: f64) -> Option<Self> {
         let cosine = normal.dot(to_viewer);
@@ -144,7 +150,7 @@ impl ShadingFrame {
         Some(Self { e, f: normal.cross(&e), normal: *normal, wo, min_cosine })
     }
 
-    /// The frame at `(x, y)` of the unit disc, seen from `+z`; none where the viewer sees black.
+    /// The frame at `(x, y)` of the unit disc, seen from `+z`; `None` where the sphere is shown black.
     fn on_disc(x: f64, y: f64) -> Option<Self> {
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
         if z < GRAZING_COSINE {
@@ -157,9 +163,10 @@ impl ShadingFrame {
         Some(Self { e, f: normal.cross(&e), normal, wo, min_cosine: GRAZING_COSINE })
     }
 
-    /// Adds to `sums`, one for each table, the radiance `f(wi, wo) cos theta_i irradiance` that the point reflects to the
-    /// viewer of light from the unit direction `light`; `irradiance` is that of a surface that faces the light. `f` is
-    /// the trilinear lookup. Nothing is added where the cosine is not positive or under the frame's least one.
+    /// Adds the radiance `f(wi, wo) cos theta_i irradiance` that the point reflects towards the viewer to
+    /// `sums`, one for each table. The light comes from the unit direction `light`; `irradiance` is that of a
+    /// surface that faces it. `f` is looked up trilinearly. Nothing is added if the cosine is not positive or
+    /// is below the `min_cosine` of the frame.
     #[inline]
     pub fn add_light(&self, tables: &[&BrdfTable], light: &Vector3<f64>, irradiance: Rgb, sums: &mut [Rgb]) {
         let cosine = light.dot(&self.normal);
@@ -177,16 +184,16 @@ impl ShadingFrame {
     }
 }
 
-/// A unit vector at right angles to a unit vector.
+/// A unit vector that is perpendicular to a unit vector.
 fn any_perpendicular(normal: &Vector3<f64>) -> Vector3<f64> {
     let axis = if normal.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
     (axis - axis.dot(normal) * normal).normalize()
 }
 
-/// Pixels of a tile: where each stands, and its radiance for each table.
+/// Pixels of a tile: the index of each, and its radiance for each table.
 type Shaded = Vec<(usize, Vec<Rgb>)>;
 
-/// Shades a tile. Light by light, since neighbouring pixels read neighbouring cells.
+/// Shades a tile light by light, since neighbouring pixels then read neighbouring cells.
 fn shade(tables: &[&BrdfTable], lights: &[DistantLight], pixels: &[(usize, ShadingFrame)]) -> Shaded {
     let mut radiance: Vec<_> = pixels.iter().map(|&(i, _)| (i, vec![[0.0; 3]; tables.len()])).collect();
     for light in lights {
@@ -197,8 +204,9 @@ fn shade(tables: &[&BrdfTable], lights: &[DistantLight], pixels: &[(usize, Shadi
     radiance
 }
 
-/// [`HalfDiff::from_directions`] to 5e-8 radians, for unit directions above the horizon: the sine and cosine of
-/// `theta_h` come from `h` itself, and the three arctangents from a polynomial.
+/// [`HalfDiff::from_directions`] with an error of at most 5e-8 radians, for unit directions above the
+/// horizon. The sine and cosine of `theta_h` are taken from `h` itself, and the three arctangents from a
+/// polynomial.
 fn half_diff(wi: &Vector3<f64>, wo: &Vector3<f64>) -> HalfDiff {
     let sum = wi + wo;
     let length = sum.norm();
@@ -218,8 +226,8 @@ fn half_diff(wi: &Vector3<f64>, wo: &Vector3<f64>) -> HalfDiff {
     HalfDiff { theta_h: theta_h.min(FRAC_PI_2), theta_d: theta_d.min(FRAC_PI_2), phi_d }
 }
 
-/// `atan2` to 5e-8: M. Abramowitz and I. Stegun, "Handbook of Mathematical Functions" (1964), 4.4.49, whose
-/// relative error is at most 2e-8 on `[0, 1]`, continued by symmetry.
+/// `atan2` with an error of at most 5e-8. Source: M. Abramowitz and I. Stegun, "Handbook of Mathematical
+/// Functions" (1964), 4.4.49, whose relative error is at most 2e-8 on `[0, 1]`, continued by symmetry.
 fn atan2(y: f64, x: f64) -> f64 {
     const COEFFICIENTS: [f64; 8] = [
         0.002_866_225_7,

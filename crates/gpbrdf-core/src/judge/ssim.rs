@@ -10,13 +10,13 @@ const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
 /// Mean structural similarity of two planes of values in `[0, 1]` over the pixels in `mask`:
-/// `(2 mx my + C1) (2 sxy + C2) / ((mx^2 + my^2 + C1) (sx^2 + sy^2 + C2))` with means, variances and covariance
-/// under an 11 x 11 Gaussian window of standard deviation 1.5.
+/// `(2 mx my + C1) (2 sxy + C2) / ((mx^2 + my^2 + C1) (sx^2 + sy^2 + C2))` with means, variances and
+/// covariance under an 11 x 11 Gaussian window of standard deviation 1.5.
 ///
 /// Source: Z. Wang, A. C. Bovik, H. R. Sheikh and E. P. Simoncelli, "Image Quality Assessment: From Error
-/// Visibility to Structural Similarity" (2004), eq. 13, with `K1 = 0.01` and `K2 = 0.03`. A window that reaches
-/// over the frame sees 0 there. 1 where the mask is empty. `a`, `b` and `mask` have `width` times as many
-/// entries as there are rows.
+/// Visibility to Structural Similarity" (2004), eq. 13, with `K1 = 0.01` and `K2 = 0.03`. Parts of a window
+/// beyond the frame are taken as 0. The result is 1 if the mask is empty. The lengths of `a`, `b` and `mask`
+/// are the same multiple of `width`.
 pub(crate) fn mean_ssim(a: &[f64], b: &[f64], mask: &[bool], width: usize) -> f64 {
     let product = |x: &[f64], y: &[f64]| -> Vec<f64> { x.iter().zip(y).map(|(x, y)| x * y).collect() };
     let mean_a = blur(a, width);
@@ -38,7 +38,7 @@ pub(crate) fn mean_ssim(a: &[f64], b: &[f64], mask: &[bool], width: usize) -> f6
     if count == 0 { 1.0 } else { sum / count as f64 }
 }
 
-/// Convolution with the window, zero outside of the frame.
+/// Convolution with the window; the plane is zero outside of the frame.
 fn blur(plane: &[f64], width: usize) -> Vec<f64> {
     let mut window: [f64; 2 * RADIUS + 1] = std::array::from_fn(|i| {
         let x = i as f64 - RADIUS as f64;
@@ -65,7 +65,7 @@ fn blur(plane: &[f64], width: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A mask of the pixels whose window lies within a 24 x 24 frame.
+    /// A mask of the pixels whose window is within a frame of 24 x 24 pixels.
     fn interior() -> Vec<bool> {
         (0..24 * 24).map(|i| (5..19).contains(&(i % 24)) && (5..19).contains(&(i / 24))).collect()
     }
@@ -76,13 +76,14 @@ mod tests {
         assert!((mean_ssim(&a, &a, &[true; 576], 24) - 1.0).abs() < 1e-12);
         let (x, y) = (0.5, 0.6);
         let found = mean_ssim(&[x; 576], &[y; 576], &interior(), 24);
-        // By hand: (2 * 0.5 * 0.6 + 1e-4) / (0.25 + 0.36 + 1e-4).
+        // Computed by hand: (2 * 0.5 * 0.6 + 1e-4) / (0.25 + 0.36 + 1e-4).
         assert!((found - 0.600_1 / 0.610_1).abs() < 1e-12, "{found}");
     }
 
     #[test]
     fn a_texture_against_its_mirror_image_about_the_mean_is_dissimilar() {
-        // Symmetric window and pattern: the blurred means are 1/2 in both up to the window's own ripple.
+        // Window and pattern are symmetric: the blurred means are 1/2 in both, up to the ripple of the
+        // window.
         let a: Vec<f64> = (0..576).map(|i| if (i % 24 + i / 24) % 2 == 0 { 0.7 } else { 0.3 }).collect();
         let b: Vec<f64> = a.iter().map(|x| 1.0 - x).collect();
         let found = mean_ssim(&a, &b, &interior(), 24);

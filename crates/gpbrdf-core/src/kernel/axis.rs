@@ -19,16 +19,16 @@ pub struct Term1d {
 
 /// A covariance function of the distance along one axis, `k(d) = sum_m weight_m shape_m(d / l_m)`.
 ///
-/// Its log-parameters are, for each term, `ln weight` (not for the first term, whose weight stays fixed, usually
-/// at 1, since the variance of the whole kernel scales all of them), `ln length_scale` and `ln alpha` where the
-/// shape has one.
+/// Each term contributes these log-parameters: `ln weight`, `ln length_scale`, and `ln alpha` if the shape
+/// has one. The weight of the first term is no parameter: it stays fixed, usually at 1, since the variance of
+/// the whole kernel scales all weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kernel1d {
     /// The summands; at least one.
     pub terms: Vec<Term1d>,
 }
 
-/// What a log-parameter is the logarithm of.
+/// The quantity of which a log-parameter is the logarithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
     /// The variance of a kernel's term, in the squared unit of the targets.
@@ -42,7 +42,7 @@ pub enum ParameterKind {
 }
 
 impl Kernel1d {
-    /// One shape of weight 1.
+    /// A kernel of one shape with a weight of 1.
     #[must_use]
     pub fn new(shape: Shape, length_scale: f64) -> Self {
         Self { terms: vec![Term1d { weight: 1.0, shape, length_scale }] }
@@ -54,9 +54,10 @@ impl Kernel1d {
         self.terms.iter().map(|t| t.weight * t.shape.value((d / t.length_scale).powi(2))).sum()
     }
 
-    /// `k(d)`, adding `factor dk/dp` to `out` for every log-parameter `p`.
+    /// Returns `k(d)` and adds `factor dk/dp` to `out` for every log-parameter `p`.
     ///
-    /// `out` has [`Kernel1d::n_parameters`] elements; elements missing at its end are left out.
+    /// `out` has [`Kernel1d::n_parameters`] elements. If it is shorter, the derivatives that do not fit are
+    /// left out.
     pub fn add_gradient(&self, d: f64, factor: f64, out: &mut [f64]) -> f64 {
         let mut out = out.iter_mut();
         let mut add = |amount: f64| {
@@ -80,10 +81,10 @@ impl Kernel1d {
         total
     }
 
-    /// Whether there is a term and every parameter is in its domain.
+    /// Checks that there is a term and that every parameter is in its domain.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for the first that is not.
+    /// [`Error::InvalidArgument`] for the first parameter that is not in its domain, or if there is no term.
     pub fn validate(&self) -> Result<()> {
         if self.terms.is_empty() {
             return Err(Error::argument("kernel of one axis", "at least one term", "none"));
@@ -106,7 +107,7 @@ impl Kernel1d {
             .sum()
     }
 
-    /// The log-parameters, in the order of the type's description.
+    /// The log-parameters, in the order given for [`Kernel1d`].
     #[must_use]
     pub fn log_parameters(&self) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -120,7 +121,7 @@ impl Kernel1d {
         out
     }
 
-    /// What each log-parameter is; length scales are those of axis `axis`.
+    /// The kind of each log-parameter. Length scales are those of the axis with index `axis`.
     #[must_use]
     pub fn parameter_kinds(&self, axis: usize) -> Vec<ParameterKind> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -132,7 +133,7 @@ impl Kernel1d {
         out
     }
 
-    /// Replaces squared distances by kernel values; in vector instructions for shapes of closed form.
+    /// Replaces squared distances by kernel values; in vector instructions for shapes with a closed form.
     pub(crate) fn fill(&self, squared_distances: &mut [f64]) {
         let fill_term = |term: &Term1d, values: &mut [f64]| {
             scale_in_place((term.length_scale * term.length_scale).recip(), values);
@@ -155,7 +156,7 @@ impl Kernel1d {
         }
     }
 
-    /// Their names, for example `terms[1].log_weight`.
+    /// The names of the log-parameters, for example `terms[1].log_weight`.
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -174,8 +175,8 @@ impl Kernel1d {
     /// Sets the parameters from their logarithms.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a wrong number of values, or one whose exponential is zero or not finite;
-    /// the kernel is then unchanged.
+    /// [`Error::InvalidArgument`] for a wrong number of values, or one whose exponential is zero or not
+    /// finite; the kernel is then unchanged.
     pub fn set_log_parameters(&mut self, log_parameters: &[f64]) -> Result<()> {
         check_log_parameters(log_parameters, self.n_parameters())?;
         let mut values = log_parameters.iter().map(|p| p.exp());
@@ -192,7 +193,7 @@ impl Kernel1d {
     }
 }
 
-/// Refuses what is not positive and finite.
+/// Refuses a value that is not positive and finite.
 pub(super) fn positive(what: &'static str, value: f64) -> Result<()> {
     if value > 0.0 && value.is_finite() {
         Ok(())
@@ -201,7 +202,7 @@ pub(super) fn positive(what: &'static str, value: f64) -> Result<()> {
     }
 }
 
-/// Refuses a wrong count and logarithms of what is not a positive finite number.
+/// Refuses a wrong number of log-parameters, and one whose exponential is not a positive finite number.
 pub(super) fn check_log_parameters(log_parameters: &[f64], expected: usize) -> Result<()> {
     if log_parameters.len() != expected {
         let expected = format!("{expected} values");

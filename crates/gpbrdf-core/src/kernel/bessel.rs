@@ -1,21 +1,22 @@
-//! The modified Bessel function of the second kind, in the form the Matern class needs.
+//! The modified Bessel function of the second kind, in the form that the Matern class needs.
 
 /// `ln(z^order K_order(z))` for real `order` and `z > 0`.
 ///
 /// With `t = s - ln z` in `K_v(z) = 1/2 int exp(v t - z cosh t) dt` over the whole line,
-/// `z^v K_v(z) = 1/2 int exp(v s - (e^s + z^2 e^-s) / 2) ds`:
-/// the power of `z` is absorbed, so nothing cancels, and the exponent is concave with its top at
-/// `e^s = v + sqrt(v^2 + z^2)`. The integrand is analytic in the strip `|Im s| < pi / 2`, where the trapezoidal
-/// rule converges exponentially in the inverse step.
+/// `z^v K_v(z) = 1/2 int exp(v s - (e^s + z^2 e^-s) / 2) ds`. The power of `z` is absorbed, so that nothing
+/// cancels, and the exponent is concave with its maximum at `e^s = v + sqrt(v^2 + z^2)`. The integrand is
+/// analytic in the strip `|Im s| < pi / 2`, where the trapezoidal rule converges exponentially in the inverse
+/// step.
 ///
-/// Sources: NIST DLMF 10.32.9; L. N. Trefethen and J. A. C. Weideman, "The exponentially convergent trapezoidal
-/// rule", SIAM Review 56 (2014), section 5.
+/// Sources: NIST DLMF 10.32.9; L. N. Trefethen and J. A. C. Weideman, "The exponentially convergent
+/// trapezoidal rule", SIAM Review 56 (2014), section 5.
 ///
-/// Relative error of the exponential: below 1e-13 for `|order| <= 50`. Cost: about 30 exponentials for a large
-/// `z`, a few hundred for a tiny `z` and a small order.
+/// Relative error of the exponential: below 1e-13 for `|order| <= 50`. Cost: about 30 exponentials for a
+/// large `z`, and a few hundred for a tiny `z` and a small order.
 pub(crate) fn log_power_bessel_k(order: f64, z: f64) -> f64 {
     let hypotenuse = order.hypot(z);
-    // At the top `rise = e^s / 2` and `fall = z^2 e^-s / 2`: their difference is the order, their product z^2 / 4.
+    // At the maximum, `rise = e^s / 2` and `fall = z^2 e^-s / 2`: their difference is the order, their
+    // product z^2 / 4.
     let larger = 0.5 * (hypotenuse + order.abs());
     let smaller = z / larger * (0.25 * z);
     let (rise, fall, top) = if order >= 0.0 {
@@ -23,9 +24,9 @@ pub(crate) fn log_power_bessel_k(order: f64, z: f64) -> f64 {
     } else {
         (smaller, larger, 2.0 * z.ln() - (2.0 * larger).ln())
     };
-    // The top looks like a Gaussian of standard deviation hypotenuse^-1/2.
+    // Near its maximum the integrand resembles a Gaussian of standard deviation hypotenuse^-1/2.
     let step = (0.6 / hypotenuse.sqrt()).min(0.2);
-    // Exponent at `top + offset`, relative to the one at `top`.
+    // The integrand at `top + offset`, relative to its value at `top`.
     let relative = |offset: f64| (order * offset - rise * offset.exp_m1() - fall * (-offset).exp_m1()).exp();
     let mut sum = 1.0;
     for sign in [1.0, -1.0] {
@@ -40,7 +41,7 @@ pub(crate) fn log_power_bessel_k(order: f64, z: f64) -> f64 {
     order * top - rise - fall + (0.5 * step * sum).ln()
 }
 
-/// A bound on the work for arguments outside the documented domain; an order of 0.05 at a `z` of 1e-154 takes
+/// Bounds the work for arguments outside the documented domain. An order of 0.05 at a `z` of 1e-154 takes
 /// 3,600 nodes.
 const MAX_NODES: i32 = 20_000;
 

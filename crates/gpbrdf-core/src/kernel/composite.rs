@@ -6,19 +6,20 @@ use super::axis::{Kernel1d, ParameterKind, check_log_parameters, positive};
 use super::shape::Shape;
 use crate::base::error::{Error, Result};
 
-/// How far apart two values of one coordinate are.
+/// The distance between two values of one coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AxisMetric {
     /// `|x - x'|`.
     #[default]
     Linear,
-    /// `|sin(x - x')|`, half the chord between the angles `2 x` and `2 x'`: for an angle of period pi.
+    /// `|sin(x - x')|`, half the chord between the angles `2 x` and `2 x'`. It is meant for an angle of
+    /// period pi.
     Chord,
 }
 
 impl AxisMetric {
-    /// The distance of two values.
+    /// The distance between two values.
     #[must_use]
     pub fn distance(self, a: f64, b: f64) -> f64 {
         match self {
@@ -32,16 +33,16 @@ impl AxisMetric {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KernelBody {
-    /// One shape of the joint distance `r^2 = sum_k d_k^2 / l_k^2` (automatic relevance determination); the
-    /// paper's eq. 7 is this one with the rational quadratic.
+    /// One shape of the joint distance `r^2 = sum_k d_k^2 / l_k^2` (automatic relevance determination). With
+    /// the rational quadratic, this is the paper's eq. 7.
     Ard {
         /// The radial shape.
         shape: Shape,
         /// Length scale of each axis, positive.
         length_scale: Vec<f64>,
     },
-    /// `prod_k k_k(d_k)`, the form the lattice needs. The same as [`KernelBody::Ard`] for the squared exponential
-    /// only.
+    /// `prod_k k_k(d_k)`, the form that the lattice needs. It is the same function as [`KernelBody::Ard`]
+    /// only for the squared exponential.
     Product(
         /// The kernel of each axis.
         Vec<Kernel1d>,
@@ -57,11 +58,11 @@ pub struct KernelTerm {
     pub body: KernelBody,
 }
 
-/// A covariance function of points of dimension `d`: `k(x, x') = sum_t variance_t body_t(d_1, ..., d_d)`, with the
-/// distances `d_k` of [`AxisMetric`].
+/// A covariance function of points of dimension `d`: `k(x, x') = sum_t variance_t body_t(d_1, ..., d_d)`,
+/// with the distances `d_k` of [`AxisMetric`].
 ///
-/// Its log-parameters are, for each term, `ln variance`, then for an ARD term `ln l_1 ... ln l_d` and `ln alpha`
-/// where the shape has one, for a product the log-parameters of each axis ([`Kernel1d`]) in turn.
+/// Each term contributes these log-parameters: `ln variance`; then for an ARD term `ln l_1 ... ln l_d`, and
+/// `ln alpha` if the shape has one; for a product the log-parameters of each axis ([`Kernel1d`]) in turn.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Kernel {
     /// The summands; at least one.
@@ -71,7 +72,7 @@ pub struct Kernel {
 }
 
 impl KernelTerm {
-    /// A name that tells a shape of the joint distance from a product: `matern52_ard`,
+    /// A name that distinguishes a shape of the joint distance from a product: `matern52_ard`,
     /// `product(rq, matern12 + matern52)`.
     #[must_use]
     pub fn name(&self) -> String {
@@ -106,7 +107,7 @@ impl KernelTerm {
 }
 
 impl Kernel {
-    /// One ARD term with the linear metric.
+    /// A kernel of one ARD term with the linear metric.
     #[must_use]
     pub fn ard(variance: f64, shape: Shape, length_scale: &[f64]) -> Self {
         let body = KernelBody::Ard { shape, length_scale: length_scale.to_vec() };
@@ -116,7 +117,7 @@ impl Kernel {
         }
     }
 
-    /// One product term, with the metric of each axis.
+    /// A kernel of one product term, with the metric of each axis.
     #[must_use]
     pub fn product(variance: f64, axes: Vec<(Kernel1d, AxisMetric)>) -> Self {
         let (axes, metric) = axes.into_iter().unzip();
@@ -136,13 +137,13 @@ impl Kernel {
         names.join(" + ")
     }
 
-    /// `k(x, x)`, the same at every point.
+    /// `k(x, x)`, which is the same at every point.
     #[must_use]
     pub fn prior_variance(&self) -> f64 {
         self.terms.iter().map(KernelTerm::prior_variance).sum()
     }
 
-    /// `k(x, y)`; both of [`Kernel::dimension`] elements.
+    /// `k(x, y)`. Both points have [`Kernel::dimension`] elements.
     #[must_use]
     pub fn value(&self, x: &[f64], y: &[f64]) -> f64 {
         let distance = |k: usize| self.metric[k].distance(x[k], y[k]);
@@ -160,8 +161,8 @@ impl Kernel {
         total
     }
 
-    /// `k(x, y)`, writing `dk/dp` for every log-parameter `p` into `out`, which has [`Kernel::n_parameters`]
-    /// elements. Allocates nothing; quadratic in the dimension for a product.
+    /// Returns `k(x, y)` and writes `dk/dp` for every log-parameter `p` into `out`, which has
+    /// [`Kernel::n_parameters`] elements. Allocates nothing. Cost: quadratic in the dimension for a product.
     ///
     /// # Panics
     /// If `x`, `y` or `out` is too short.
@@ -206,10 +207,11 @@ impl Kernel {
         total
     }
 
-    /// Whether there is a term, every term has the dimension of the metric and every parameter is in its domain.
+    /// Checks that there is a term, that every term has the dimension of the metric and that every parameter
+    /// is in its domain.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for the first that is not.
+    /// [`Error::InvalidArgument`] for the first condition that does not hold.
     pub fn validate(&self) -> Result<()> {
         if self.terms.is_empty() {
             return Err(Error::argument("kernel", "at least one term", "none"));
@@ -241,7 +243,7 @@ impl Kernel {
         self.terms.iter().map(KernelTerm::n_parameters).sum()
     }
 
-    /// The log-parameters, in the order of the type's description.
+    /// The log-parameters, in the order given for [`Kernel`].
     #[must_use]
     pub fn log_parameters(&self) -> Vec<f64> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -258,7 +260,7 @@ impl Kernel {
         out
     }
 
-    /// What each log-parameter is.
+    /// The kind of each log-parameter.
     #[must_use]
     pub fn parameter_kinds(&self) -> Vec<ParameterKind> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -277,7 +279,7 @@ impl Kernel {
         out
     }
 
-    /// Their names, for example `terms[0].log_length_scale[2]`.
+    /// The names of the log-parameters, for example `terms[0].log_length_scale[2]`.
     #[must_use]
     pub fn parameter_names(&self) -> Vec<String> {
         let mut out = Vec::with_capacity(self.n_parameters());
@@ -305,8 +307,8 @@ impl Kernel {
     /// Sets the parameters from their logarithms.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a wrong number of values, or one whose exponential is zero or not finite;
-    /// the kernel is then unchanged.
+    /// [`Error::InvalidArgument`] for a wrong number of values, or one whose exponential is zero or not
+    /// finite; the kernel is then unchanged.
     pub fn set_log_parameters(&mut self, log_parameters: &[f64]) -> Result<()> {
         check_log_parameters(log_parameters, self.n_parameters())?;
         let mut rest = log_parameters;
@@ -342,7 +344,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::kernel::axis::Term1d;
 
-    /// One kernel of every kind: each shape with ARD, a sum, a product of sums, both metrics; dimension 3.
+    /// Kernels of every kind, in dimension 3: each shape with ARD, a sum, a product of sums, both metrics.
     pub(crate) fn kernels() -> Vec<Kernel> {
         let shapes = [
             Shape::SquaredExponential,

@@ -4,26 +4,26 @@ use super::axis::{Kernel1d, Term1d};
 use super::shape::Shape;
 use crate::base::simd::{exp_slice, vectorized};
 
-/// Largest exponent on either side of the middle for which a separated exponential stays in range.
+/// Largest exponent, on either side of the middle, for which a separated exponential is in range.
 const LARGEST_EXPONENT: f64 = 600.0;
 
-/// Working arrays of [`Kernel1d::fill_grid`].
+/// Work arrays of [`Kernel1d::fill_grid`].
 #[derive(Debug, Default)]
 pub(crate) struct GridScratch {
-    /// `exp(scale (x - middle))` and its inverse at the points, then at the nodes.
+    /// `exp(scale (x - middle))` and its inverse, at the points and at the nodes.
     rising: Vec<f64>,
     falling: Vec<f64>,
     node_rising: Vec<f64>,
     node_falling: Vec<f64>,
-    /// One term's values.
+    /// The values of one term.
     term: Vec<f64>,
 }
 
 impl Kernel1d {
     /// Writes `k(|point - node|)` to `out[node][point]`.
     ///
-    /// The Matern shapes of half-integer order need no exponential a pair: `exp(-s |x - y|)` is the smaller of
-    /// `exp(-s x) exp(s y)` and `exp(s x) exp(-s y)`, within 1e-13.
+    /// The Matern shapes of half-integer order need no exponential per pair: `exp(-s |x - y|)` is the smaller
+    /// of `exp(-s x) exp(s y)` and `exp(s x) exp(-s y)`, within 1e-13.
     pub(crate) fn fill_grid(
         &self,
         points: &[f64],
@@ -51,7 +51,7 @@ fn fill_term(term: &Term1d, points: &[f64], nodes: &[f64], scratch: &mut GridScr
     if points.is_empty() {
         return;
     }
-    // sqrt(2 nu) and the coefficients of the polynomial in s.
+    // sqrt(2 nu), and the coefficients of the polynomial in s.
     let (root, coefficients) = match term.shape {
         Shape::Matern12 => (1.0, [1.0, 0.0, 0.0]),
         Shape::Matern32 => (3f64.sqrt(), [1.0, 1.0, 0.0]),
@@ -64,7 +64,7 @@ fn fill_term(term: &Term1d, points: &[f64], nodes: &[f64], scratch: &mut GridScr
     };
     let ((a, b), (c, d)) = (range(points), range(nodes));
     let (low, high) = (a.min(c), b.max(d));
-    // Not so for NaN either.
+    // The condition also sends NaN to the generic form.
     if !(0.5 * scale * (high - low) < LARGEST_EXPONENT) {
         return fill_generic(term, points, nodes, out);
     }

@@ -4,13 +4,19 @@ mod axis;
 mod bessel;
 mod composite;
 mod grid;
+#[cfg(feature = "fit")]
+mod row_gradient;
 mod rows;
 mod shape;
 mod slices;
+#[cfg(feature = "fit")]
+mod slopes;
 
 pub use axis::{Kernel1d, ParameterKind, Term1d};
 pub use composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
 pub(crate) use grid::GridScratch;
+#[cfg(feature = "fit")]
+pub(crate) use row_gradient::GradientScratch;
 pub(crate) use rows::{Points, RowScratch};
 pub use shape::Shape;
 

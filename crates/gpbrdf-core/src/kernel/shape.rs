@@ -8,9 +8,9 @@ use crate::base::error::{Error, Result};
 /// A radial covariance function `k(r)` with `k(0) = 1`, of the scaled distance
 /// `r = sqrt(sum_k (x_k - x'_k)^2 / l_k^2)`.
 ///
-/// Sources: the paper eqs. 6, 7 and 21; C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine
-/// Learning" (2006), eqs. 4.9, 4.14, 4.17 and 4.19. The paper's eq. 21 prints `sqrt(2 nu r)` where the Matern
-/// class has `sqrt(2 nu) r`; the latter is what stands here.
+/// Sources: the paper, eqs. 6, 7 and 21; C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for
+/// Machine Learning" (2006), eqs. 4.9, 4.14, 4.17 and 4.19. The paper's eq. 21 prints `sqrt(2 nu r)` where
+/// the Matern class has `sqrt(2 nu) r`; the latter is used here.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -33,23 +33,23 @@ pub enum Shape {
     /// `(1 + sqrt(5) r + 5 r^2 / 3) exp(-sqrt(5) r)`: twice differentiable paths.
     #[serde(rename = "matern52")]
     Matern52,
-    /// `2^(1 - nu) / Gamma(nu) (sqrt(2 nu) r)^nu K_nu(sqrt(2 nu) r)`, with the modified Bessel function of the
-    /// second kind. About a hundred times slower than the closed forms.
+    /// `2^(1 - nu) / Gamma(nu) (sqrt(2 nu) r)^nu K_nu(sqrt(2 nu) r)`, with the modified Bessel function of
+    /// the second kind. About a hundred times slower than the closed forms.
     Matern {
         /// Smoothness, in `[0.05, 50]`; the parameter is not optimised.
         nu: f64,
     },
 }
 
-/// The orders [`Shape::Matern`] takes.
+/// The orders that [`Shape::Matern`] accepts.
 const NU_RANGE: std::ops::RangeInclusive<f64> = 0.05..=50.0;
 
-/// Below this squared distance the general Matern shape is taken at zero: its square root is the smallest distance
-/// whose square is a normal number.
+/// Below this squared distance the general Matern shape is evaluated at zero: its square root is the smallest
+/// distance whose square is a normal number.
 const TINY_R2: f64 = f64::MIN_POSITIVE;
 
 impl Shape {
-    /// `k`, as a function of the squared scaled distance `r2 = r^2 >= 0`. NaN for an invalid parameter.
+    /// `k` as a function of the squared scaled distance `r2 = r^2 >= 0`. NaN for an invalid parameter.
     #[must_use]
     pub fn value(self, r2: f64) -> f64 {
         match self {
@@ -71,9 +71,9 @@ impl Shape {
 
     /// `(k, slope)` with `slope = -2 dk/d(r^2) = -(dk/dr) / r >= 0`, at the squared scaled distance `r2`.
     ///
-    /// The derivative by the logarithm of one length scale is then a product, with no quotient of small numbers:
-    /// `dk/d(ln l_k) = slope (x_k - x'_k)^2 / l_k^2`. Where the slope diverges at `r = 0` (Matern, `nu <= 1`) it is
-    /// given as 0 there, since that product tends to 0.
+    /// The derivative with respect to the logarithm of one length scale is then a product, without a quotient
+    /// of small numbers: `dk/d(ln l_k) = slope (x_k - x'_k)^2 / l_k^2`. Where the slope diverges at `r = 0`
+    /// (Matern, `nu <= 1`), it is set to 0 there, since that product tends to 0.
     #[must_use]
     pub fn value_and_slope(self, r2: f64) -> (f64, f64) {
         match self {
@@ -103,14 +103,14 @@ impl Shape {
                 let slope = 5.0 / 3.0 * (1.0 + s) * e;
                 (finite_or_zero((1.0 + s + s2 / 3.0) * e, s), finite_or_zero(slope, s))
             }
-            // d/dz [z^nu K_nu(z)] = -z^nu K_(nu-1)(z) (DLMF 10.29.4), and z = sqrt(2 nu) r.
+            // By DLMF 10.29.4, d/dz [z^nu K_nu(z)] = -z^nu K_(nu-1)(z); here z = sqrt(2 nu) r.
             Self::Matern { nu } => (self.value(r2), matern(nu, nu - 1.0, r2, (2.0 * nu).ln())),
         }
     }
 
     /// `dk/d(ln alpha)` at the squared scaled distance `r2`; 0 for the shapes that have no alpha.
     ///
-    /// For the rational quadratic `alpha k (q / (1 + q) - ln(1 + q))` with `q = r^2 / (2 alpha)`.
+    /// For the rational quadratic it is `alpha k (q / (1 + q) - ln(1 + q))` with `q = r^2 / (2 alpha)`.
     #[must_use]
     pub fn d_log_alpha(self, r2: f64) -> f64 {
         match self {
@@ -123,10 +123,11 @@ impl Shape {
         }
     }
 
-    /// Whether the parameters are in their domains.
+    /// Checks that the parameters are in their domains.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for an alpha that is not positive and finite, or a nu outside `[0.05, 50]`.
+    /// [`Error::InvalidArgument`] for an `alpha` that is not positive and finite, or a `nu` outside
+    /// `[0.05, 50]`.
     pub fn validate(self) -> Result<()> {
         match self {
             Self::RationalQuadratic { alpha } if !(alpha > 0.0 && alpha.is_finite()) => {
@@ -139,7 +140,7 @@ impl Shape {
         }
     }
 
-    /// Every shape, with the parameters that it has where none are given: an alpha of 1, a nu of 3/2.
+    /// Every shape, with its default parameters: an `alpha` of 1, a `nu` of 3/2.
     pub const ALL: [Self; 6] = [
         Self::SquaredExponential,
         Self::RationalQuadratic { alpha: 1.0 },
@@ -149,7 +150,7 @@ impl Shape {
         Self::Matern { nu: 1.5 },
     ];
 
-    /// The name in files, reports and on the command line, and the one on screens.
+    /// The name in files, in reports and on the command line, and the name on screens.
     fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::SquaredExponential => ("se", "Squared exponential"),
@@ -173,10 +174,10 @@ impl Shape {
         self.names().1
     }
 
-    /// The shape of this [`Shape::name`], with the parameters of [`Shape::ALL`].
+    /// The shape with this [`Shape::name`] and the parameters of [`Shape::ALL`].
     ///
     /// # Errors
-    /// [`Error::UnknownName`] for a name that no shape has.
+    /// [`Error::UnknownName`], which lists the names that exist.
     pub fn from_name(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|shape| shape.name() == name).ok_or_else(|| Error::UnknownName {
             kind: "kernel shape",
@@ -191,7 +192,7 @@ impl Shape {
         self.alpha().is_some()
     }
 
-    /// The mixture parameter of the rational quadratic.
+    /// The mixture parameter of the rational quadratic; `None` for other shapes.
     #[must_use]
     pub fn alpha(self) -> Option<f64> {
         match self {
@@ -200,7 +201,7 @@ impl Shape {
         }
     }
 
-    /// The same shape with another alpha; unchanged where there is none.
+    /// The same shape with another `alpha`. Shapes without one are unchanged.
     #[must_use]
     pub fn with_alpha(self, alpha: f64) -> Self {
         match self {
@@ -210,12 +211,14 @@ impl Shape {
     }
 }
 
-/// A product with a factor `exp(-s)`; at an infinite `s` it would be infinity times zero.
+/// A product that contains the factor `exp(-s)`; for an infinite `s` it would be computed as infinity times
+/// zero.
 fn finite_or_zero(product: f64, s: f64) -> f64 {
     if s == f64::INFINITY { 0.0 } else { product }
 }
 
-/// `exp(log_factor) 2^(1 - nu) / Gamma(nu) z^order K_order(z)` with `z = sqrt(2 nu) r`, all in logarithms.
+/// `exp(log_factor) 2^(1 - nu) / Gamma(nu) z^order K_order(z)` with `z = sqrt(2 nu) r`, computed in
+/// logarithms.
 fn matern(nu: f64, order: f64, r2: f64, log_factor: f64) -> f64 {
     if !NU_RANGE.contains(&nu) || r2.is_nan() {
         return f64::NAN;
@@ -223,13 +226,13 @@ fn matern(nu: f64, order: f64, r2: f64, log_factor: f64) -> f64 {
     if r2 < TINY_R2 {
         return match order {
             _ if order == nu => 1.0,
-            // z^v K_v(z) tends to 2^(v - 1) Gamma(v).
+            // The limit of z^v K_v(z) at zero is 2^(v - 1) Gamma(v).
             _ if order > 0.0 => nu / order,
             _ => 0.0,
         };
     }
     let z = (2.0 * nu).sqrt() * r2.sqrt();
-    // exp(-z) z^50 underflows long before.
+    // exp(-z) z^50 is zero in double precision long before this.
     if z > 4000.0 {
         return 0.0;
     }
@@ -310,7 +313,7 @@ mod tests {
                 let step = 1e-4 * r2;
                 let slope = -(shape.value(r2 + step) - shape.value(r2 - step)) / step;
                 let (_, analytic) = shape.value_and_slope(r2);
-                // The last term is the rounding of the two values, divided by the step.
+                // The last term allows for the rounding of the two values, divided by the step.
                 let tolerance = 1e-6 * analytic + 1e-13 / step;
                 assert!((slope - analytic).abs() < tolerance, "{shape:?} {r2}: {slope} {analytic}");
                 if let Some(alpha) = shape.alpha() {

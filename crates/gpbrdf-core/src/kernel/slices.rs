@@ -1,13 +1,14 @@
-//! Shapes over whole slices, in vector instructions where the form is closed.
+//! Shapes evaluated over whole slices, in vector instructions where there is a closed form.
 
 use super::shape::Shape;
 use crate::base::simd::{exp, exp_slice, vectorized};
 
-/// Above this `exp(-s)` is zero; bounding the factor of it by this keeps infinity times zero out.
+/// Above this `exp(-s)` is zero. Factors of it are bounded by this, so that infinity is not multiplied by
+/// zero.
 const LARGEST: f64 = 800.0;
 
 #[inline(always)]
-fn bounded_sqrt(s2: f64) -> f64 {
+pub(super) fn bounded_sqrt(s2: f64) -> f64 {
     let s = s2.sqrt();
     if s > LARGEST { LARGEST } else { s }
 }
@@ -21,17 +22,8 @@ fn map(values: &mut [f64], f: impl Fn(f64) -> f64) {
     });
 }
 
-#[inline(always)]
-fn map_pair(r2: &[f64], value: &mut [f64], slope: &mut [f64], f: impl Fn(f64) -> (f64, f64)) {
-    vectorized(|| {
-        for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
-            (*value, *slope) = f(*r2);
-        }
-    });
-}
-
 impl Shape {
-    /// Replaces every squared scaled distance by [`Shape::value`] of it, to 1e-15.
+    /// Replaces every squared scaled distance by its [`Shape::value`], with an error of 1e-15.
     pub(crate) fn fill(self, r2: &mut [f64]) {
         match self {
             Self::SquaredExponential => map(r2, |r2| exp(-0.5 * r2)),
@@ -53,43 +45,6 @@ impl Shape {
             Self::Matern { .. } => {
                 for v in r2 {
                     *v = self.value(*v);
-                }
-            }
-        }
-    }
-
-    /// [`Shape::value_and_slope`] of every squared scaled distance; three slices of one length.
-    pub(crate) fn fill_with_slope(self, r2: &[f64], value: &mut [f64], slope: &mut [f64]) {
-        match self {
-            Self::SquaredExponential => map_pair(r2, value, slope, |r2| {
-                let k = exp(-0.5 * r2);
-                (k, k)
-            }),
-            Self::Matern12 => map_pair(r2, value, slope, |r2| {
-                let r = r2.sqrt();
-                let k = exp(-r);
-                (k, if r > 0.0 { k / r } else { 0.0 })
-            }),
-            Self::Matern32 => map_pair(r2, value, slope, |r2| {
-                let s = bounded_sqrt(3.0 * r2);
-                let e = exp(-s);
-                ((1.0 + s) * e, 3.0 * e)
-            }),
-            Self::Matern52 => map_pair(r2, value, slope, |r2| {
-                let s = bounded_sqrt(5.0 * r2);
-                let e = exp(-s);
-                ((1.0 + s + s * s * (1.0 / 3.0)) * e, 5.0 / 3.0 * (1.0 + s) * e)
-            }),
-            Self::RationalQuadratic { alpha } => {
-                value.copy_from_slice(r2);
-                self.fill(value);
-                for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
-                    *slope = *value / (1.0 + r2 / (2.0 * alpha));
-                }
-            }
-            Self::Matern { .. } => {
-                for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
-                    (*value, *slope) = self.value_and_slope(*r2);
                 }
             }
         }
@@ -116,19 +71,9 @@ mod tests {
         ] {
             let mut values = r2.clone();
             shape.fill(&mut values);
-            let mut pair = (vec![0.0; r2.len()], vec![0.0; r2.len()]);
-            shape.fill_with_slope(&r2, &mut pair.0, &mut pair.1);
-            for (i, &r2) in r2.iter().enumerate() {
-                let (k, slope) = shape.value_and_slope(r2);
-                assert!((values[i] - k).abs() <= 2e-15 * k, "{shape:?} {r2:e}: {} {k}", values[i]);
-                assert_eq!(values[i], pair.0[i]);
-                if r2.is_finite() {
-                    assert!(
-                        (pair.1[i] - slope).abs() <= 2e-15 * slope,
-                        "{shape:?} {r2:e}: {} {slope}",
-                        pair.1[i]
-                    );
-                }
+            for (value, &r2) in values.iter().zip(&r2) {
+                let k = shape.value(r2);
+                assert!((value - k).abs() <= 2e-15 * k, "{shape:?} {r2:e}: {value} {k}");
             }
         }
     }

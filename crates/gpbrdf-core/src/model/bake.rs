@@ -74,7 +74,7 @@ impl Baked {
         Intervals { mean, sigma, noise_variances: *noise_variances, transform: *transform }
     }
 }
-#[cfg(test)]
+#[cfg(all(test, feature = "fit", feature = "formats"))]
 mod tests {
     use super::*;
     use crate::brdf::table::{cell_center, cell_indices};

@@ -6,7 +6,6 @@
 //! (`channels x A x B x C`); of a dense one `x` (`n x 3`), `targets` and `weights` (`n x channels`); of an inducing one
 //! `k.values` (`A x B x C`, f16) for each component `k`, from which nodes and weights follow. All but those are f64.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use safetensors::tensor::SafeTensors;
@@ -80,8 +79,8 @@ impl Model {
         let unwritable = |what: &dyn std::fmt::Display| Error::argument("model", "finite numbers", what);
         let json = serde_json::to_string(&header).map_err(|e| unwritable(&e))?;
         let views = tensors.views().map_err(|e| unwritable(&e))?;
-        safetensors::serialize(views, Some(HashMap::from([("gpbrdf".to_owned(), json)])))
-            .map_err(|e| unwritable(&e))
+        let metadata = [("gpbrdf".to_owned(), json)].into_iter().collect();
+        safetensors::serialize(views, Some(metadata)).map_err(|e| unwritable(&e))
     }
 
     /// Reads a model file. Predictions of the result equal those of the model that was written, bit for bit. Nothing is

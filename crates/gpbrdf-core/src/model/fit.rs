@@ -1,7 +1,7 @@
 //! From samples to a model.
 
 use crate::base::error::{Error, Result};
-use crate::gp::solver::{Problem, Watch};
+use crate::gp::problem::{Problem, Watch};
 use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Solver};
 use crate::kernel::Shape;
 use crate::model::Model;
@@ -151,7 +151,7 @@ fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, 
     Ok((targets, offsets))
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "formats"))]
 mod tests {
     use super::*;
     use crate::formats::source::Source;

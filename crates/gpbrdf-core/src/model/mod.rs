@@ -1,13 +1,17 @@
 //! A fitted Gaussian-process BRDF: fitting, predicting, saving, baking.
 
 pub(crate) mod bake;
+#[cfg(feature = "fit")]
 pub(crate) mod compress;
 pub(crate) mod file;
+#[cfg(feature = "fit")]
 pub(crate) mod fit;
 mod interval;
 
 pub use bake::{Baked, bake_mean, bake_sigma};
+#[cfg(feature = "fit")]
 pub use compress::{CellWeights, CompressOptions, InducingSize, compress};
+#[cfg(feature = "fit")]
 pub use fit::{Conditioned, Fit, FitOptions, condition, fit};
 pub use interval::{IntervalOf, Intervals};
 
@@ -233,3 +237,6 @@ impl Brdf for Model {
         out.copy_from_slice(&self.predict_mean(angles));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,4 @@
-//! Where to sample a BRDF.
+//! Product lattices of directions to measure.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,39 +8,41 @@ use crate::brdf::table::N_THETA_H;
 use crate::sample::space::WarpedBox;
 use crate::sample::symmetry::Symmetry;
 
-/// The exponent of nodes along a folded `phi` where there are enough of them; what others reach is in `docs/results.md`.
+/// The exponent of nodes along a folded `phi` on large lattices. Results with other exponents are in
+/// `docs/results.md`.
 pub(crate) const PHI_DENSITY: f64 = 1.5;
 
-/// A product lattice in the warped box, `A x B x C` nodes along `u`, `v` and `phi`.
+/// A product lattice in the warped box, with `A x B x C` nodes along `u`, `v` and `phi`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LatticeLayout {
-    /// Nodes along `u`, `v`, `phi`.
+    /// Number of nodes along `u`, `v` and `phi`.
     pub shape: [usize; 3],
-    /// Exponent of the warp along `u`, in which kernels measure distance: `u^(1/node_density)`.
+    /// Exponent of the warp along `u`: kernels measure distance in `u^(1/node_density)`.
     pub node_density: f64,
-    /// Exponent `p > 1` of the nodes along `u`: `u = s t + (1 - s) t^p` with `t` evenly spaced and `s = A / 90`, so
-    /// that at the specular peak the nodes stand on the centres of the table's cells, no denser, and spread out
-    /// from there. 0 for `u = t^node_density`, nodes that are even in the warp.
+    /// Exponent `p > 1` of the nodes along `u`: `u = s t + (1 - s) t^p` with `t` evenly spaced and
+    /// `s = A / 90`, at most 1. Next to the specular peak the nodes are then at the centres of the table's
+    /// cells and no denser; they spread out from there. 0 means `u = t^node_density`, nodes that are evenly
+    /// spaced in the warp.
     pub node_spread: f64,
-    /// Exponent of the nodes along `v`: `v = v_max t^v_density`; below 1 the nodes crowd towards the horizon.
+    /// Exponent of the nodes along `v`: `v = v_max t^v_density`. Below 1 the nodes crowd towards the horizon.
     pub v_density: f64,
     /// The largest `v`; 1 is the horizon, where nothing can be measured.
     pub v_max: f64,
     /// Symmetry in `phi_d`.
     pub symmetry: Symmetry,
-    /// Exponent of the nodes along a folded `phi`: `phi = pi/2 (1 - (1 - t)^phi_density)`; above 1 the nodes crowd towards
-    /// `phi_d = pi/2`.
+    /// Exponent of the nodes along a folded `phi`: `phi = pi/2 (1 - (1 - t)^phi_density)`. Above 1 the nodes
+    /// crowd towards `phi_d = pi/2`.
     #[serde(default = "even")]
     pub phi_density: f64,
 }
 
-/// Nodes of files that say nothing.
+/// The `phi_density` of files that do not have one: evenly spaced nodes.
 fn even() -> f64 {
     1.0
 }
 
 impl Default for LatticeLayout {
-    /// 64 x 32 x 18 nodes: 36,864 samples, 2.5 % of the table.
+    /// A lattice of 64 x 32 x 18 nodes: 36,864 samples, 2.5 % of the table.
     fn default() -> Self {
         Self {
             shape: [64, 32, 18],
@@ -54,17 +56,19 @@ impl Default for LatticeLayout {
     }
 }
 
-/// The exponent along `v` of `b` nodes: the more there are, the more they crowd towards the horizon.
+/// The exponent of `b` nodes along `v`: the more nodes there are, the more they crowd towards the horizon.
 fn v_density(b: usize) -> f64 {
     0.6 + 0.3 / b as f64
 }
 
-/// The largest `v` of `b` nodes: what lies beyond is extrapolated, and grows there; few nodes are better spent elsewhere.
+/// The position of the last of `b` nodes along `v`. Beyond it a fit extrapolates, and `f` grows towards the
+/// horizon. Many nodes therefore reach closer to 1; few nodes are better used at smaller `v`.
 fn v_max(b: usize) -> f64 {
     1.0 - (0.18 / b as f64).clamp(0.01, 0.09)
 }
 
-/// How the nodes along `phi` grow with the number of samples: faster than the others, whose power is half of the rest.
+/// The number of nodes along `phi` grows like the number of samples to this power; those along `u` and `v`
+/// grow more slowly, each like the number of samples to the power of `(1 - 0.38) / 2 = 0.31`.
 const PHI_POWER: f64 = 0.38;
 
 impl LatticeLayout {
@@ -80,8 +84,9 @@ impl LatticeLayout {
         self.len() == 0
     }
 
-    /// A lattice of this shape. Few nodes spread and crowd less: `node_spread = 1 + A / 32`, at most 3;
-    /// `v_density = 0.6 + 0.3 / B`; `v_max = 1 - 0.18 / B`, 0.91 to 0.99; `phi_density = 1 + C / 16`, at most 1.5.
+    /// A lattice of this shape. The fewer nodes there are, the more evenly they are spaced:
+    /// `node_spread = 1 + A / 32`, at most 3; `v_density = 0.6 + 0.3 / B`; `v_max = 1 - 0.18 / B`, between
+    /// 0.91 and 0.99; `phi_density = 1 + C / 16`, at most 1.5.
     #[must_use]
     pub fn with_shape(shape: [usize; 3], symmetry: Symmetry) -> Self {
         let node_spread = (1.0 + shape[0] as f64 / 32.0).min(3.0);
@@ -90,25 +95,25 @@ impl LatticeLayout {
         Self { shape, node_spread, v_density, v_max, phi_density, symmetry, ..Self::default() }
     }
 
-    /// A lattice with about `samples` nodes, that of the default one in its proportions; with fewer samples the nodes
-    /// along `phi` thin out most.
+    /// A lattice with about `samples` nodes. Its sides along `u` and `v` have the proportions of the default
+    /// lattice; with fewer samples, the number of nodes along `phi` decreases most.
     ///
     /// # Errors
-    /// Fewer than 12 samples.
+    /// [`Error::InvalidArgument`] for fewer than 12 samples.
     pub fn with_samples(samples: usize, symmetry: Symmetry) -> Result<Self> {
         if samples < 12 {
             return Err(Error::argument("number of samples", "at least 12", samples));
         }
         let reference = Self::default().shape.map(|n| n as f64);
-        // The circle is twice as long as the folded interval.
+        // The whole circle is twice as long as the folded interval.
         let stretch = if symmetry == Symmetry::Reciprocal { 2.0 } else { 1.0 };
         let reference = [reference[0], reference[1], reference[2] * stretch];
         let scale = samples as f64 / reference.iter().product::<f64>();
         let along_phi = (reference[2] * scale.powf(PHI_POWER)).max(2.0);
-        // What is left to the plane of the other two, in the default's proportions.
+        // The remaining factor is shared by u and v in the default's proportions.
         let side = (samples as f64 / along_phi / (reference[0] * reference[1])).sqrt();
         let ideal = [reference[0] * side, reference[1] * side, along_phi];
-        // Among the roundings of the three sides, the product nearest to the request.
+        // Of all ways to round the three sides, the one whose product is nearest to the request is chosen.
         let mut best = ([2, 2, 2], f64::INFINITY);
         for corner in 0..8 {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "sides are positive")]
@@ -126,7 +131,8 @@ impl LatticeLayout {
     /// Checks every field.
     ///
     /// # Errors
-    /// A side of fewer than 2 or more than 512 nodes, a density or `v_max` outside its range.
+    /// [`Error::InvalidArgument`] for a side of fewer than 2 or more than 512 nodes, or a density or `v_max`
+    /// outside its range.
     pub fn validate(&self) -> Result<()> {
         if self.shape.iter().any(|n| !(2..=512).contains(n)) {
             let [a, b, c] = self.shape;
@@ -166,7 +172,7 @@ impl LatticeLayout {
         }
     }
 
-    /// The nodes along `u`, `v` and `phi`, increasing.
+    /// The nodes along `u`, `v` and `phi`, in increasing order.
     #[must_use]
     pub fn nodes(&self) -> [Vec<f64>; 3] {
         let [a, b, c] = self.shape.map(|n| n as f64);
@@ -178,7 +184,8 @@ impl LatticeLayout {
         let u = (0..self.shape[0]).map(|i| place((i as f64 + 0.5) / a)).collect();
         let v =
             (0..self.shape[1]).map(|i| (i as f64 / (b - 1.0)).powf(self.v_density) * self.v_max).collect();
-        // Half a step off the ends of a folded phi, where the mirrored kernel already knows that slopes vanish.
+        // Nodes along phi begin and end half a step off the ends of a folded phi, where the mirrored kernel
+        // already knows that slopes vanish.
         let period = self.symmetry.phi_extent();
         let phi_density = if self.symmetry == Symmetry::Bilateral { self.phi_density } else { 1.0 };
         let place = |t: f64| period * (1.0 - (1.0 - t).powf(phi_density));
@@ -186,7 +193,7 @@ impl LatticeLayout {
         [u, v, phi]
     }
 
-    /// The directions of the nodes, `phi` fastest, then `v`, then `u`.
+    /// The directions of the nodes. `phi` varies fastest, then `v`, then `u`.
     #[must_use]
     pub fn directions(&self) -> Vec<HalfDiff> {
         let [u, v, phi] = self.nodes();

@@ -1,4 +1,4 @@
-//! Which directions to measure.
+//! Layouts: the choice of directions to measure.
 
 use std::f64::consts::PI;
 
@@ -7,28 +7,28 @@ use crate::brdf::angles::{BoxPoint, HalfDiff};
 use crate::brdf::table::{N_CELLS, cell_center, cell_indices};
 use crate::sample::lattice::LatticeLayout;
 
-/// Which directions to measure.
+/// The choice of directions to measure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Layout {
     /// A product lattice in the warped box.
     Lattice(LatticeLayout),
-    /// Directions drawn uniformly in the warped box.
+    /// Directions drawn uniformly in the warped box, with `v` below `v_max` of the default lattice.
     Random {
-        /// How many.
+        /// Number of directions.
         count: usize,
-        /// Seed of the draw.
+        /// Seed of the random numbers.
         seed: u64,
     },
-    /// Centres of valid table cells drawn without replacement.
+    /// Centres of table cells above the horizon, drawn without replacement.
     Cells {
-        /// How many.
+        /// Number of cells.
         count: usize,
-        /// Seed of the draw.
+        /// Seed of the random numbers.
         seed: u64,
     },
 }
 
-/// `count` directions drawn uniformly in the warped box up to `v = v_max`, from `seed`.
+/// `count` directions drawn uniformly in the warped box, with `v` below `v_max`, from `seed`.
 #[must_use]
 pub fn random_directions(count: usize, v_max: f64, seed: u64) -> Vec<HalfDiff> {
     let mut random = SplitMix64::new(seed);
@@ -40,7 +40,8 @@ pub fn random_directions(count: usize, v_max: f64, seed: u64) -> Vec<HalfDiff> {
         .collect()
 }
 
-/// `count` distinct valid cells of the table drawn from `seed`: their centres, in table order.
+/// The centres of `count` distinct table cells above the horizon, drawn from `seed`, in table order. All
+/// cells if `count` exceeds their number.
 #[must_use]
 pub fn random_cells(count: usize, seed: u64) -> Vec<HalfDiff> {
     let centre = |index| {
@@ -50,7 +51,7 @@ pub fn random_cells(count: usize, seed: u64) -> Vec<HalfDiff> {
     let mut valid: Vec<usize> = (0..N_CELLS).filter(|&index| centre(index).is_above_horizon()).collect();
     let count = count.min(valid.len());
     let mut random = SplitMix64::new(seed);
-    // The first `count` places of a Fisher-Yates shuffle.
+    // These are the first `count` steps of a Fisher-Yates shuffle.
     for i in 0..count {
         let left = (valid.len() - i) as u64;
         #[expect(clippy::cast_possible_truncation, reason = "below the number of cells")]

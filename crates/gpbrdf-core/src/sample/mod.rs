@@ -1,4 +1,5 @@
-//! Where to measure, what was measured, and how kernels and targets see it.
+//! Where to measure, what was measured, and how measurements become inputs of kernels and targets of
+//! processes.
 
 pub(crate) mod lattice;
 pub(crate) mod layout;

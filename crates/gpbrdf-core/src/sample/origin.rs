@@ -1,4 +1,4 @@
-//! Where samples come from.
+//! The origin of samples.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,16 +8,16 @@ use crate::sample::lattice::LatticeLayout;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleLayout {
-    /// They stand on a product lattice.
+    /// The nodes of a product lattice.
     Lattice,
-    /// They were drawn at random.
+    /// Directions drawn at random.
     Random,
-    /// They are centres of table cells.
+    /// Centres of table cells drawn at random.
     Cells,
-    /// They are those of a file of measurements.
+    /// The directions of a file of measurements.
     #[default]
     Samples,
-    /// They are all valid cells of a table.
+    /// All cells of a table that are above the horizon.
     Table,
 }
 
@@ -35,17 +35,17 @@ impl SampleLayout {
     }
 }
 
-/// Where samples, and a model that was fitted to them, come from.
+/// The origin of samples, and of a model that was fitted to them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Name of the material.
     pub material: String,
-    /// File or built-in material that was sampled.
+    /// The file or built-in material that was sampled.
     pub source: String,
-    /// sha256 of that file, hexadecimal; empty for built-in materials.
+    /// SHA-256 sum of that file, hexadecimal; empty for built-in materials.
     pub sha256: String,
     /// How the directions were chosen.
     pub layout: SampleLayout,
-    /// The lattice that the directions stand on, if they do.
+    /// The lattice whose nodes are the directions, if there is one.
     pub lattice: Option<LatticeLayout>,
 }

@@ -1,4 +1,4 @@
-//! What was measured.
+//! Sets of measured values.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,32 +17,33 @@ pub struct Sample {
     pub wi: Vector3<f64>,
     /// Unit direction to the viewer, above the horizon.
     pub wo: Vector3<f64>,
-    /// `f(wi, wo)` in sr^-1, cosine not included.
+    /// `f(wi, wo)` in sr^-1, without the cosine.
     pub value: Rgb,
 }
 
-/// Measured values at known directions: what a model is fitted to. Samples keep the order of their source.
+/// Measured values at known directions, to which a model is fitted. Samples keep the order of their source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampleSet {
-    /// What the source says about itself; empty where it says nothing.
+    /// What the source says about itself; empty if it says nothing.
     pub description: String,
     /// Half-difference angles of each sample.
     pub angles: Vec<HalfDiff>,
-    /// `f` in sr^-1 at each of them.
+    /// `f` in sr^-1 at each of the angles.
     pub values: Vec<Rgb>,
-    /// `[wi, wo]` of each sample as they were measured, turned about the normal as they were; empty where only the
+    /// `[wi, wo]` of each sample as measured, including its rotation about the normal. Empty if only the
     /// angles are known.
     pub directions: Vec<[Vector3<f64>; 2]>,
-    /// Where they come from. If [`Provenance::lattice`] is there, the samples are in the order of its nodes.
+    /// Where the samples come from. If [`Provenance::lattice`] is given, the samples are in the order of its
+    /// nodes.
     pub origin: Provenance,
 }
 
 impl SampleSet {
-    /// Evaluates `brdf` at the directions of a layout, in parallel. The origin names the layout only;
-    /// [`Source::measure`](crate::Source::measure) fills in the rest.
+    /// Evaluates `brdf` at the directions of a layout, in parallel. Only the layout is recorded as the
+    /// origin; [`Source::measure`](crate::Source::measure) fills in the rest.
     ///
     /// # Errors
-    /// A broken layout.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an invalid lattice.
     pub fn measure(brdf: &dyn Brdf, layout: &Layout) -> Result<Self> {
         let (angles, lattice, kind) = match layout {
             Layout::Lattice(lattice) => {
@@ -70,19 +71,20 @@ impl SampleSet {
         self.angles.len()
     }
 
-    /// Whether there is no sample.
+    /// Whether the set has no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.angles.is_empty()
     }
 
-    /// The lattice that the samples stand on, if they do; they are in the order of its nodes.
+    /// The lattice whose nodes are the directions, if there is one. The samples are in the order of its
+    /// nodes.
     #[must_use]
     pub fn lattice(&self) -> Option<&LatticeLayout> {
         self.origin.lattice.as_ref()
     }
 
-    /// The samples one by one. Where the measured directions are not known, the half vector lies above the x axis.
+    /// The samples one by one. If the measured directions are not known, the half vector is above the x axis.
     pub fn iter(&self) -> impl Iterator<Item = Sample> + '_ {
         self.angles.iter().zip(&self.values).enumerate().map(|(i, (angles, &value))| {
             let [wi, wo] = self.directions.get(i).copied().unwrap_or_else(|| angles.to_directions().into());
@@ -91,7 +93,7 @@ impl SampleSet {
     }
 }
 
-/// Directions that a task evaluates at a time.
+/// Number of directions that a task evaluates at a time.
 const BLOCK: usize = 256;
 
 impl FromIterator<Sample> for SampleSet {

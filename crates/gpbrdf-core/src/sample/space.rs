@@ -1,4 +1,4 @@
-//! From directions to the coordinates that kernels see.
+//! From directions to the coordinates in which kernels measure distance.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,12 +9,12 @@ use crate::brdf::angles::{BoxPoint, HalfDiff, fold_phi_d};
 use crate::kernel::AxisMetric;
 use crate::sample::symmetry::Symmetry;
 
-/// The warped box, stretched where nodes crowd: coordinates
+/// The warped box, stretched where nodes are dense, so that they are nearly even in its coordinates:
 /// `u' = 1 - (1 - u^(1/density))^tail`, `v' = min(v, 1)^(1/v_density)`, `phi' = warp_phi(phi)`.
 ///
-/// The first is the distribution function of P. Kumaraswamy (1980), as in J. Snoek et al., "Input Warping for Bayesian
-/// Optimization" (2014); it is a power where `tail` is 1. Directions below the horizon get the coordinates of the
-/// horizon, `v' = 1`.
+/// `u'` is the distribution function of P. Kumaraswamy (1980), as in J. Snoek et al., "Input Warping for
+/// Bayesian Optimization" (2014); with a `tail` of 1 it is a power of `u`. Directions below the horizon have
+/// the coordinates of the horizon, `v' = 1`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WarpedBox {
     /// Exponent of the warp along `u`.
@@ -23,10 +23,11 @@ pub struct WarpedBox {
     pub v_density: f64,
     /// Symmetry in `phi_d`; [`Symmetry::Bilateral`] folds `phi` to `[0, pi/2]`.
     pub symmetry: Symmetry,
-    /// Second exponent of the warp along `u`: below 1 nodes crowd towards `theta_h = pi/2`, above 1 they thin out.
+    /// Second exponent of the warp along `u`: below 1 it suits nodes that crowd towards `theta_h = pi/2`,
+    /// above 1 nodes that thin out there.
     #[serde(default = "one")]
     pub tail: f64,
-    /// Exponent of the warp along a folded `phi`; above 1 nodes crowd towards `phi = pi/2`.
+    /// Exponent of the warp along a folded `phi`: above 1 it suits nodes that crowd towards `phi = pi/2`.
     #[serde(default = "one")]
     pub phi_density: f64,
 }
@@ -46,7 +47,7 @@ impl WarpedBox {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// A density that is not positive and finite.
+    /// [`Error::InvalidArgument`] for an exponent that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         let densities = [self.density, self.v_density, self.tail, self.phi_density];
         match densities.into_iter().find(|x| !(*x > 0.0 && x.is_finite())) {
@@ -59,25 +60,25 @@ impl WarpedBox {
     #[must_use]
     pub fn warp_u(self, u: f64) -> f64 {
         let power = u.powf(1.0 / self.density);
-        // An exponent of 1 changes nothing, not even the last bit.
+        // With an exponent of 1 nothing may change, not even the last bit.
         if self.tail == 1.0 { power } else { 1.0 - (1.0 - power.min(1.0)).powf(self.tail) }
     }
 
-    /// The second coordinate at `v`; it stays at the horizon's 1 for all directions below the horizon.
+    /// The second coordinate at `v`. It is 1, the value at the horizon, for all directions below the horizon.
     #[must_use]
     pub fn warp_v(self, v: f64) -> f64 {
         v.min(1.0).powf(1.0 / self.v_density)
     }
 
-    /// The third coordinate at `phi`, which a bilateral box has folded to `[0, pi/2]`:
-    /// `pi/2 (1 - (1 - phi / (pi/2))^(1/p))` there with `p = phi_density`, else `phi` itself.
+    /// The third coordinate at `phi`. A bilateral box has folded `phi` to `[0, pi/2]`, and the coordinate is
+    /// `pi/2 (1 - (1 - phi / (pi/2))^(1/p))` with `p = phi_density`; otherwise it is `phi` itself.
     ///
-    /// `theta_d_max` has a kink in `phi` at `pi/2`, where it depends on `|cos phi_d|`, and so has everything that is
-    /// smooth in `theta_d` when it is seen along `v`. In this coordinate the kink is a power of `p`: nearly the even
-    /// function that the mirrored kernel expects.
+    /// `theta_d_max` has a kink in `phi` at `pi/2`, since it depends on `|cos phi_d|`. Every function that is
+    /// smooth in `theta_d` therefore has a kink there as a function of `v` and `phi`. In this coordinate the
+    /// kink becomes a power with exponent `p`, nearly the even function that the mirrored kernel expects.
     #[must_use]
     pub fn warp_phi(self, phi: f64) -> f64 {
-        // An exponent of 1 changes nothing, not even the last bit.
+        // With an exponent of 1 nothing may change, not even the last bit.
         if self.symmetry == Symmetry::Bilateral && self.phi_density != 1.0 {
             FRAC_PI_2 * (1.0 - (1.0 - phi / FRAC_PI_2).max(0.0).powf(self.phi_density.recip()))
         } else {
@@ -85,14 +86,14 @@ impl WarpedBox {
         }
     }
 
-    /// Whether functions of each coordinate are even, about 0 and with the period of a chord: those of a folded `phi`
-    /// are.
+    /// For each coordinate, whether functions of it are even about 0 and have the period of a chord. This is
+    /// so for a folded `phi`.
     #[must_use]
     pub fn mirrored(self) -> [bool; 3] {
         [false, false, self.symmetry == Symmetry::Bilateral]
     }
 
-    /// Metrics of a lattice: `phi` is always an angle of period `pi` there, and a folded one is
+    /// The metrics of a lattice. There `phi` is always an angle of period `pi`; a folded one is
     /// [`WarpedBox::mirrored`] as well.
     #[must_use]
     pub fn lattice_metrics(self) -> [AxisMetric; 3] {
@@ -100,14 +101,15 @@ impl WarpedBox {
     }
 }
 
-/// The input space of a process: three coordinates for each pair of directions, and how distance is measured.
+/// The input space of a process: three coordinates for each pair of directions, and the metric of each
+/// coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum InputSpace {
     /// The warped box.
     WarpedBox(WarpedBox),
-    /// `(theta_h, theta_d, phi_d)` in radians, as they are: the paper's own setting.
+    /// `(theta_h, theta_d, phi_d)` in radians, without a warp. This is the paper's own setting.
     HalfDiff,
 }
 
@@ -124,7 +126,7 @@ impl InputSpace {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// A density that is not positive and finite.
+    /// [`Error::InvalidArgument`] for an exponent that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         match self {
             Self::WarpedBox(warped) => warped.validate(),
@@ -138,13 +140,13 @@ impl InputSpace {
         matches!(self, Self::WarpedBox(WarpedBox { symmetry: Symmetry::Bilateral, .. }))
     }
 
-    /// Whether all directions of one `(theta_h, phi_d)` below the horizon have the same coordinates.
+    /// Whether all directions below the horizon that share `theta_h` and `phi_d` have the same coordinates.
     #[must_use]
     pub fn stops_at_horizon(self) -> bool {
         matches!(self, Self::WarpedBox(_))
     }
 
-    /// How distance is measured along each coordinate.
+    /// The metric of each coordinate.
     #[must_use]
     pub fn metrics(self) -> [AxisMetric; 3] {
         let phi = match self {
@@ -161,7 +163,7 @@ impl From<WarpedBox> for InputSpace {
     }
 }
 
-/// The tail and the density along `phi` of files that have none.
+/// The `tail` and the `phi_density` of files that do not have them.
 fn one() -> f64 {
     1.0
 }

@@ -9,19 +9,19 @@ use crate::brdf::angles::BoxPoint;
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::target::log_value;
 
-/// The symmetry of `f` in `phi_d` that a layout and a model rely on.
+/// The symmetry of `f` in `phi_d` on which a layout and a model rely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Symmetry {
-    /// `phi_d` and `pi - phi_d` are alike, besides reciprocity: `phi` folds to `[0, pi/2]`.
+    /// `f` is the same at `phi_d` and `pi - phi_d`, in addition to reciprocity: `phi` folds to `[0, pi/2]`.
     #[default]
     Bilateral,
-    /// Only `phi_d` and `phi_d + pi` are alike: `phi` lives on a circle of length `pi`.
+    /// `f` is the same only at `phi_d` and `phi_d + pi`: `phi` is on a circle of length `pi`.
     Reciprocal,
 }
 
 impl Symmetry {
-    /// The length of the axis of `phi`: `pi/2` where it is folded, else `pi`.
+    /// The length of the axis of `phi`: `pi/2` if it is folded, else `pi`.
     pub(crate) fn phi_extent(self) -> f64 {
         match self {
             Self::Bilateral => FRAC_PI_2,
@@ -30,17 +30,17 @@ impl Symmetry {
     }
 }
 
-/// Largest difference in `ln(f + 1e-3)` between `phi_d` and `pi - phi_d` that still counts as bilateral, as a root
-/// mean square over the probes.
+/// A BRDF is taken for bilateral if the root mean square difference in `ln(f + 1e-3)` between `phi_d` and
+/// `pi - phi_d`, over all probes, is below this.
 const BILATERAL_TOLERANCE: f64 = 0.03;
 
-/// Probes `brdf` at 64 pairs `phi_d`, `pi - phi_d` and says which symmetry its samples can rely on: bilateral where
-/// `ln(f + 1e-3)` differs by less than 3 % root mean square.
+/// Finds out on which symmetry samples of `brdf` can rely. It is evaluated at 64 pairs `phi_d`, `pi - phi_d`,
+/// and taken for bilateral if the root mean square difference in `ln(f + 1e-3)` is below 3 %.
 #[must_use]
 pub fn detect_symmetry(brdf: &dyn Brdf) -> Symmetry {
     let lattice = LatticeLayout { shape: [4, 4, 4], v_max: 0.9, ..LatticeLayout::default() };
     let [u, v, phi] = lattice.nodes();
-    // Off the ends of phi, where both sides are the same direction.
+    // The ends of phi are avoided, since both sides are the same direction there.
     let phi = phi.iter().map(|p| 0.1 + 0.8 * p);
     let mut sum = 0.0;
     for phi in phi {

@@ -1,30 +1,31 @@
-//! BRDF values as regression targets, and back.
+//! The transform from BRDF values to regression targets, and its inverse.
 
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::{Error, Result};
 use crate::base::simd::exp_slice;
 
-/// What the Gaussian process is fitted to: a monotone function `g(f)` of a BRDF value `f` in sr^-1.
+/// The transform to the targets of a Gaussian process: a monotone function `g(f)` of a BRDF value `f` in
+/// sr^-1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Transform {
-    /// `g = f`: the paper's own setting.
+    /// `g = f`. This is the paper's own setting.
     Identity,
-    /// `g = ln(f + epsilon)`: errors relative to the value, and predictions that stay positive.
+    /// `g = ln(f + epsilon)`. Errors become relative to the value, and predictions stay positive.
     Log {
-        /// Keeps dark values apart from zero, sr^-1.
+        /// Bounds the logarithm of dark values, sr^-1.
         epsilon: f64,
     },
     /// `g = f^(1/3)`.
     CubeRoot,
 }
 
-/// The epsilon of logarithms of BRDF values, sr^-1: of the default transform, of metrics and of pictures.
+/// The epsilon of logarithms of BRDF values, sr^-1, in the default transform, in metrics and in pictures.
 pub const LOG_EPSILON: f64 = 1e-3;
 
-/// `ln(max(f, 0) + 1e-3)`: the scale on which errors are relative, for values above [`LOG_EPSILON`].
+/// `ln(max(f, 0) + 1e-3)`. On this scale, errors are relative for values above [`LOG_EPSILON`].
 #[must_use]
 pub fn log_value(f: f64) -> f64 {
     (f.max(0.0) + LOG_EPSILON).ln()
@@ -37,7 +38,7 @@ impl Default for Transform {
 }
 
 impl Transform {
-    /// `g(f)`; negative values count as zero where the transform asks for it.
+    /// `g(f)`. The logarithm takes negative values as zero.
     #[must_use]
     pub fn forward(self, f: f64) -> f64 {
         match self {
@@ -47,7 +48,7 @@ impl Transform {
         }
     }
 
-    /// `f(g)`, at least zero.
+    /// The inverse of [`Transform::forward`]: `f` at the target `g`, at least zero.
     #[must_use]
     pub fn inverse(self, g: f64) -> f64 {
         match self {
@@ -69,6 +70,7 @@ impl Transform {
     }
 
     /// `df / dg` at the target `g`.
+    #[cfg(feature = "fit")]
     pub(crate) fn slope_of_inverse(self, g: f64) -> f64 {
         match self {
             Self::Identity => 1.0,
@@ -80,7 +82,7 @@ impl Transform {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// `epsilon` not positive and finite.
+    /// [`Error::InvalidArgument`] for an `epsilon` that is not positive and finite.
     pub fn validate(self) -> Result<()> {
         match self {
             Self::Log { epsilon } if !(epsilon > 0.0 && epsilon.is_finite()) => {
@@ -99,12 +101,12 @@ pub enum MeanFunction {
     /// The average target of each channel.
     #[default]
     Constant,
-    /// Zero: the paper's own setting.
+    /// Zero. This is the paper's own setting.
     Zero,
 }
 
 impl MeanFunction {
-    /// The prior mean of targets that average `average`.
+    /// The prior mean of one channel with these targets.
     #[must_use]
     pub fn offset(self, targets: &[f64]) -> f64 {
         match self {

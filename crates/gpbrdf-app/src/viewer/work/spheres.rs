@@ -157,7 +157,7 @@ fn make(
     if let (None, Some(truth)) = (&known, &request.truth) {
         tables.push(truth);
     }
-    let mut images = render_sphere(&tables, &lights, size, stale)?;
+    let mut images = render_sphere(&tables, &lights, size, stale).ok()?;
     let truth = known.or_else(|| if images.len() > 1 { images.pop() } else { None });
     let truth = truth.filter(|_| request.truth.is_some());
     let mean = images.pop()?;
@@ -224,7 +224,7 @@ fn sigma_sphere(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) ->
 fn mean_sigma(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> Option<(Image, Vec<f64>)> {
     let white: Vec<_> =
         lights.iter().map(|l| DistantLight { irradiance: [l.irradiance[1]; 3], ..*l }).collect();
-    let image = render_sphere(&[table], &white, COARSE, stale)?.pop()?;
+    let image = render_sphere(&[table], &white, COARSE, stale).ok()?.pop()?;
     let total = |i: usize| {
         let center = |k: usize| 2.0 * (k as f64 + 0.5) / COARSE as f64 - 1.0;
         let (x, y) = (center(i % COARSE), -center(i / COARSE));
@@ -273,9 +273,9 @@ fn disc(image: &Image, colour: impl Fn(usize) -> Color32) -> ColorImage {
 fn metrics(request: &SphereRequest, stale: Stale<'_>) -> Option<ImageMetrics> {
     let tables = [request.truth.as_ref()?.as_ref(), request.mean.as_ref()];
     let studio = Environment::studio();
-    let env = render_sphere(&tables, &environment_lights(&studio, ENV_PATCHES), SPHERE_SIZE, stale)?;
+    let env = render_sphere(&tables, &environment_lights(&studio, ENV_PATCHES), SPHERE_SIZE, stale).ok()?;
     let [x, y, z] = POINT_LIGHT;
-    let point = render_sphere(&tables, &[point_light(x, y, z)], SPHERE_SIZE, stale)?;
+    let point = render_sphere(&tables, &[point_light(x, y, z)], SPHERE_SIZE, stale).ok()?;
     ImageMetrics::new((env.first()?, env.get(1)?), (point.first()?, point.get(1)?)).ok()
 }
 

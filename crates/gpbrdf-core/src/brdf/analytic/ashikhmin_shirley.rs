@@ -8,16 +8,17 @@ use super::Geometry;
 use crate::brdf::angles::HORIZON_COSINE;
 use crate::brdf::{Brdf, Rgb};
 
-/// An anisotropic power of the half vector's cosine with Fresnel reflection, over a diffuse base that gets
-/// what the coat lets through:
+/// An anisotropic power of the half vector's cosine with Fresnel reflection, over a diffuse base that
+/// receives the light that the coat lets through:
 ///
 /// - lobe: `sqrt((nu+1)(nv+1)) / (8 pi) cos_h^((nu h.x^2 + nv h.y^2) / (1 - cos_h^2))
 ///   / (cos_d max(cos_i, cos_o)) F`, with Schlick's `F = specular + (1 - specular)(1 - cos_d)^5`;
 /// - base: `28 diffuse / (23 pi) (1 - specular) (1 - (1 - cos_i/2)^5) (1 - (1 - cos_o/2)^5)`.
 ///
-/// Source: M. Ashikhmin and P. Shirley, "An Anisotropic Phong BRDF Model" (2000), the specular and the diffuse
-/// term. Isotropic, as tables ask, only where `exponent_u = exponent_v`; otherwise half-difference angles are
-/// read with the half vector above the x axis. Reciprocal and energy conserving.
+/// Source: M. Ashikhmin and P. Shirley, "An Anisotropic Phong BRDF Model" (2000), the specular and the
+/// diffuse term. The model is isotropic, as tables require, only where `exponent_u = exponent_v`; otherwise
+/// half-difference angles are evaluated with the half vector above the x axis. Reciprocal and energy
+/// conserving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AshikhminShirley {
     /// Albedo of the base (`R_d`).
@@ -45,7 +46,7 @@ impl Brdf for AshikhminShirley {
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
         let Some(geometry) = Geometry::new(wi, wo) else { return [0.0; 3] };
         let (h, sin2_h) = (geometry.h, geometry.sin2_h());
-        // At h = n the exponent has no limit, but the power is 1 whatever it is.
+        // At h = n the exponent has no limit, but the power is 1 for every exponent.
         let power = if sin2_h > 0.0 {
             let exponent = (self.exponent_u * h.x * h.x + self.exponent_v * h.y * h.y) / sin2_h;
             geometry.cos_h().powf(exponent)
@@ -113,7 +114,8 @@ mod tests {
             };
             assert_conserves_energy(&full, "ashikhmin-shirley");
         }
-        // 28/23 makes the base's albedo 1 - (1 - cos_i/2)^5: what enters leaves, at normal incidence 31/32.
+        // 28/23 gives the base an albedo of 1 - (1 - cos_i/2)^5: all light that enters leaves, 31/32 at
+        // normal incidence.
         let area = projected_area(|w| 28.0 / 23.0 * FRAC_1_PI * transmitted(w.z));
         assert!((area - 1.0).abs() < 1e-6, "{area}");
     }

@@ -13,15 +13,15 @@ use crate::brdf::{Brdf, Rgb};
 /// `G = min(1, 2 cos_h cos_i / cos_d, 2 cos_h cos_o / cos_d)` of V-shaped grooves.
 ///
 /// Source: J. F. Blinn, "Models of Light Reflection for Computer Synthesized Pictures" (1977), with the
-/// distribution that he calls `D3`, from T. S. Trowbridge and K. P. Reitz (1975). Blinn's `D3` has a peak of 1
-/// and no `1/4`; here `D = D3 / (pi c^2)`, so that its projected area is 1, and the factor is that of Torrance
-/// and Sparrow: the lobe then reflects no more light than falls on it. Reciprocal. Keep
+/// distribution that he calls `D3`, from T. S. Trowbridge and K. P. Reitz (1975). Blinn's `D3` has a peak of
+/// 1 and no factor `1/4`. Here `D = D3 / (pi c^2)`, so that its projected area is 1, and the factor is that
+/// of Torrance and Sparrow: the lobe then reflects no more light than falls on it. Reciprocal. Keep
 /// `diffuse + specular <= 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blinn {
     /// Diffuse albedo.
     pub diffuse: Rgb,
-    /// Weight of the lobe, 1 for a surface of facets alone.
+    /// Weight of the lobe; 1 for a surface that consists of facets alone.
     pub specular: Rgb,
     /// The ellipsoids' eccentricity `c` in `(0, 1]`: near 0 a mirror, 1 a sphere.
     pub eccentricity: f64,
@@ -36,7 +36,7 @@ impl Default for Blinn {
 }
 
 impl Blinn {
-    /// `D`, sr^-1. The bracket is `sin_h^2 + c^2 cos_h^2`, which keeps its digits near the normal.
+    /// `D`, sr^-1. The bracket is computed as `sin_h^2 + c^2 cos_h^2`, which loses no digits near the normal.
     fn distribution(&self, geometry: &Geometry) -> f64 {
         let c2 = self.eccentricity * self.eccentricity;
         let bracket = geometry.sin2_h() + c2 * geometry.cos_h() * geometry.cos_h();

@@ -20,7 +20,7 @@ pub struct BlinnPhong {
     pub diffuse: Rgb,
     /// Albedo of the lobe at normal incidence.
     pub specular: Rgb,
-    /// The exponent `n >= 0`; about four times Phong's for the same lobe.
+    /// The exponent `n >= 0`. It is about four times that of Phong's model for the same lobe.
     pub exponent: f64,
 }
 

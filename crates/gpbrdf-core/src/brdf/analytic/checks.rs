@@ -1,9 +1,10 @@
-//! Properties that every model must have, for the tests of this folder and of the built-in materials.
+//! Properties that every model must have. The tests of this folder and of the built-in materials use them.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Rotation3, Vector3};
 
+use crate::base::random::SplitMix64;
 use crate::brdf::angles::{HalfDiff, direction};
 use crate::brdf::{Brdf, Rgb};
 
@@ -25,7 +26,7 @@ pub(crate) fn pinned_pairs() -> [Pair; 4] {
     })
 }
 
-/// Compares with values computed elsewhere, one triple for each of [`pinned_pairs`].
+/// Asserts values that were computed elsewhere, one triple for each of [`pinned_pairs`].
 pub(crate) fn assert_pinned(brdf: &impl Brdf, expected: [Rgb; 4]) {
     for ((wi, wo), expected) in pinned_pairs().iter().zip(expected) {
         let found = brdf.eval(wi, wo);
@@ -36,16 +37,10 @@ pub(crate) fn assert_pinned(brdf: &impl Brdf, expected: [Rgb; 4]) {
     }
 }
 
-/// A seeded stream of numbers in `[0, 1)` (splitmix64).
+/// A seeded stream of numbers in `[0, 1)`.
 fn uniform(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
+    let mut random = SplitMix64::new(seed);
+    move || random.next_unit()
 }
 
 /// Random pairs above the horizon, uniform in solid angle.
@@ -55,7 +50,8 @@ pub(crate) fn random_pairs(seed: u64, count: usize) -> Vec<Pair> {
     (0..count).map(|_| (one(), one())).filter(|(a, b)| a.z > 1e-3 && b.z > 1e-3).collect()
 }
 
-/// Random pairs and the extreme ones: `h = n`, retro-reflection, grazing, all down to the smallest cosine.
+/// Random pairs and extreme ones: `h = n`, retro-reflection and grazing angles, down to the smallest positive
+/// cosine.
 pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
     let mut pairs = random_pairs(seed, 2000);
     let cosines =
@@ -69,7 +65,7 @@ pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
             for gap in [0.0, 1e-9, 1.0, FRAC_PI_2, PI - 1e-9, PI] {
                 pairs.push((at(a, 0.3), at(b, 0.3 + gap)));
             }
-            // Exactly opposite azimuths, without the rounding of sin(pi).
+            // Exactly opposite azimuths, without the rounding error of sin(pi).
             let (u, v) = (at(a, 0.3), at(b, 0.3));
             pairs.push((u, Vector3::new(-v.x, -v.y, v.z)));
         }
@@ -77,7 +73,7 @@ pub(crate) fn all_pairs(seed: u64) -> Vec<Pair> {
     pairs
 }
 
-/// Finite, non-negative, reciprocal, and zero at and below the horizon.
+/// Asserts that the values are finite, non-negative and reciprocal, and zero at and below the horizon.
 pub(crate) fn assert_finite_and_reciprocal(brdf: &impl Brdf, what: &str) {
     for (wi, wo) in all_pairs(1) {
         let f = brdf.eval(&wi, &wo);
@@ -91,7 +87,8 @@ pub(crate) fn assert_finite_and_reciprocal(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// A function of half-difference angles alone: unchanged when both directions turn about the normal.
+/// Asserts that the value depends on half-difference angles alone: it is unchanged when both directions turn
+/// about the normal.
 pub(crate) fn assert_isotropic(brdf: &impl Brdf, what: &str) {
     for (k, (wi, wo)) in random_pairs(2, 2000).into_iter().enumerate() {
         let f = brdf.eval(&wi, &wo);
@@ -106,7 +103,7 @@ pub(crate) fn assert_isotropic(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// All of the above.
+/// Asserts all of the above.
 pub(crate) fn assert_well_behaved(brdf: &impl Brdf, what: &str) {
     assert_finite_and_reciprocal(brdf, what);
     assert_isotropic(brdf, what);
@@ -131,7 +128,7 @@ pub(crate) fn albedo(brdf: &impl Brdf, theta_i: f64, n: u32) -> Rgb {
     sum
 }
 
-/// Albedo at most 1 at every tenth degree.
+/// Asserts an albedo of at most 1 at every tenth degree, and near the horizon.
 pub(crate) fn assert_conserves_energy(brdf: &impl Brdf, what: &str) {
     for degrees in (0..=80).step_by(10).chain([85, 88]) {
         let found = albedo(brdf, f64::from(degrees).to_radians(), 256);
@@ -139,7 +136,7 @@ pub(crate) fn assert_conserves_energy(brdf: &impl Brdf, what: &str) {
     }
 }
 
-/// `integral of D(theta) cos(theta) dw` over the hemisphere, `D` asked at unit half vectors.
+/// `integral of D(theta) cos(theta) dw` over the hemisphere, with `D` evaluated at unit half vectors.
 pub(crate) fn projected_area(distribution: impl Fn(&Vector3<f64>) -> f64) -> f64 {
     let n = 20_000;
     let step = FRAC_PI_2 / f64::from(n);

@@ -12,16 +12,17 @@ use crate::brdf::{Brdf, Rgb};
 /// `D = exp(-(tan theta_h / m)^2) / (pi m^2 cos_h^4)`, the full Fresnel reflectance `F` from the index of
 /// refraction, and the shadowing `G = min(1, 2 cos_h cos_i / cos_d, 2 cos_h cos_o / cos_d)`.
 ///
-/// Source: R. L. Cook and K. E. Torrance, "A Reflectance Model for Computer Graphics" (1982). The paper writes
-/// `F D G / (pi cos_i cos_o)` with `D = exp(..) / (m^2 cos_h^4)`: four times this lobe, and more light than
-/// falls on it. Here `D` has a projected area of 1 and the factor is that of Torrance and Sparrow. As in the
-/// paper a metal is given by the real index that has its reflectance `F0` at normal incidence,
-/// `ior = (1 + sqrt F0) / (1 - sqrt F0)`. Reciprocal. Keep `diffuse + specular <= 1` (the paper's `d + s = 1`).
+/// Source: R. L. Cook and K. E. Torrance, "A Reflectance Model for Computer Graphics" (1982). The paper
+/// writes `F D G / (pi cos_i cos_o)` with `D = exp(..) / (m^2 cos_h^4)`: four times this lobe, and more light
+/// than falls on it. Here `D` has a projected area of 1 and the factor is that of Torrance and Sparrow. As in
+/// the paper a metal is given by the real index that has its reflectance `F0` at normal incidence,
+/// `ior = (1 + sqrt F0) / (1 - sqrt F0)`. Reciprocal. Keep `diffuse + specular <= 1` (the paper's
+/// `d + s = 1`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CookTorrance {
     /// Diffuse albedo.
     pub diffuse: Rgb,
-    /// Weight of the lobe, 1 for a surface of facets alone.
+    /// Weight of the lobe; 1 for a surface that consists of facets alone.
     pub specular: Rgb,
     /// Root mean square slope `m` of the facets, positive.
     pub roughness: f64,

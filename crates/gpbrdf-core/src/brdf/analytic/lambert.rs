@@ -11,7 +11,7 @@ use crate::brdf::{Brdf, Rgb};
 /// Source: J. H. Lambert, "Photometria" (1760). Reciprocal; its directional albedo is `albedo`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lambert {
-    /// Reflected share of the light, in `[0, 1]`.
+    /// Reflected share of the light in each channel, in `[0, 1]`.
     pub albedo: Rgb,
 }
 

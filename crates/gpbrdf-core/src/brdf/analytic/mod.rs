@@ -1,7 +1,8 @@
-//! Analytic BRDF models: one plain struct each, and the geometry they share.
+//! Analytic BRDF models: one plain struct for each, and the geometry that they share.
 //!
-//! Every model is zero when a direction lies at or below the horizon, finite everywhere above it, and
-//! reciprocal to the last bit. Division by a cosine stops growing below [`HORIZON_COSINE`].
+//! Every model is zero when a direction is at or below the horizon, finite everywhere above it, and
+//! reciprocal to the last bit; only the neural one is not reciprocal. Where a model divides by a cosine, the
+//! cosine is held at [`HORIZON_COSINE`] or above.
 
 mod ashikhmin_shirley;
 mod blinn;
@@ -86,7 +87,7 @@ impl Brdf for AnalyticBrdf {
     }
 }
 
-/// The quantities of a pair of directions that the models are functions of.
+/// The geometric quantities of a pair of directions from which the models are computed.
 #[derive(Clone, Copy, Debug)]
 struct Geometry {
     /// `wi . n`, positive.
@@ -107,7 +108,7 @@ impl Geometry {
         }
         let sum = wi + wo;
         let length = sum.norm();
-        // Below this h is the normal to rounding, as in HalfDiff; opposite directions end up here too.
+        // Below this h equals the normal to rounding, as in HalfDiff. Opposite directions end up here, too.
         let h = if sum.x.hypot(sum.y) > 1e-15 { sum / length } else { Vector3::z() };
         Some(Self { cos_i: wi.z, cos_o: wo.z, h, cos_d: (0.5 * length).min(1.0) })
     }
@@ -117,7 +118,7 @@ impl Geometry {
         self.h.z.min(1.0)
     }
 
-    /// `sin^2 theta_h`, exact near the normal.
+    /// `sin^2 theta_h`, accurate near the normal.
     fn sin2_h(&self) -> f64 {
         self.h.x * self.h.x + self.h.y * self.h.y
     }
@@ -128,7 +129,7 @@ impl Geometry {
         self.sin2_h() / (cos_h * cos_h)
     }
 
-    /// `cos_i cos_o`, each at least [`HORIZON_COSINE`].
+    /// `cos_i cos_o`, with each cosine held at [`HORIZON_COSINE`] or above.
     fn cosine_product(&self) -> f64 {
         self.cos_i.max(HORIZON_COSINE) * self.cos_o.max(HORIZON_COSINE)
     }
@@ -159,7 +160,7 @@ fn fresnel_dielectric(cos_d: f64, ior: f64) -> f64 {
     let g = g_squared.sqrt();
     let sum = g + cos_d;
     if sum <= 0.0 {
-        // No interface (ior = 1) at grazing incidence.
+        // This is grazing incidence without an interface (ior = 1), where nothing is reflected.
         return 0.0;
     }
     let perpendicular = (g - cos_d) / sum;
@@ -182,7 +183,7 @@ mod tests {
         for i in 0..=90 {
             let theta = f64::from(i).to_radians();
             for ior in [1.1, 1.5, 2.4, 20.0] {
-                // The two polarisations, by the refracted angle.
+                // The two polarisations, computed from the refracted angle.
                 let (ci, ct) = (theta.cos(), (theta.sin() / ior).asin().cos());
                 let s = (ci - ior * ct) / (ci + ior * ct);
                 let p = (ior * ci - ct) / (ior * ci + ct);

@@ -1,11 +1,12 @@
-//! Neural BRDF: a small network in place of a formula.
+//! The Neural BRDF: a small network in place of a formula.
 
 use nalgebra::Vector3;
 
+use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 
-/// Inputs of the network: half vector and difference vector.
+/// Number of inputs of the network: the components of the half vector and of the difference vector.
 const INPUTS: usize = 6;
 /// Width of both hidden layers.
 const HIDDEN: usize = 21;
@@ -13,26 +14,37 @@ const HIDDEN: usize = 21;
 /// Number of weights of a [`NeuralBrdf`].
 pub const NEURAL_FLOATS: usize = INPUTS * HIDDEN + HIDDEN + HIDDEN * HIDDEN + HIDDEN + HIDDEN * 3 + 3;
 
-/// A network of two hidden layers of 21 on the half vector `h` and the difference vector `d` with `phi_h = 0`:
-/// `a1 = relu(x W1 + b1)`, `a2 = relu(a1 W2 + b2)`, `f = max(exp(a2 W3 + b3) - 1, 0)` in sr^-1.
+/// A network with two hidden layers of 21 units whose inputs are the half vector `h` and the difference
+/// vector `d` with `phi_h = 0`: `a1 = relu(x W1 + b1)`, `a2 = relu(a1 W2 + b2)`,
+/// `f = max(exp(a2 W3 + b3) - 1, 0)` in sr^-1.
 ///
-/// Source: A. Sztrajman et al., "Neural BRDF Representation and Importance Sampling" (2021). Not reciprocal by itself.
+/// Source: A. Sztrajman et al., "Neural BRDF Representation and Importance Sampling" (2021). Not reciprocal
+/// by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeuralBrdf {
-    /// `W1`, `b1`, `W2`, `b2`, `W3`, `b3` one after the other, matrices by rows, a row an input.
+    /// `W1`, `b1`, `W2`, `b2`, `W3`, `b3` in this order. Matrices are stored by rows, with one row per input.
     weights: Vec<f64>,
 }
 
 impl NeuralBrdf {
-    /// A network of these [`NEURAL_FLOATS`] weights, `W1[6][21]`, `b1[21]`, `W2[21][21]`, `b2[21]`, `W3[21][3]`, `b3[3]`;
-    /// `None` for another number of them or one that is not finite.
-    #[must_use]
-    pub fn new(weights: Vec<f64>) -> Option<Self> {
-        (weights.len() == NEURAL_FLOATS && weights.iter().all(|w| w.is_finite())).then_some(Self { weights })
+    /// A network with these [`NEURAL_FLOATS`] weights: `W1[6][21]`, `b1[21]`, `W2[21][21]`, `b2[21]`,
+    /// `W3[21][3]`, `b3[3]`.
+    ///
+    /// # Errors
+    /// Another number of weights, or one that is not finite.
+    pub fn new(weights: Vec<f64>) -> Result<Self> {
+        if weights.len() != NEURAL_FLOATS {
+            return Err(Error::argument("weights", NEURAL_FLOATS.to_string(), weights.len()));
+        }
+        match weights.iter().find(|weight| !weight.is_finite()) {
+            None => Ok(Self { weights }),
+            Some(weight) => Err(Error::argument("weights", "finite numbers", weight)),
+        }
     }
 }
 
-/// `x W + b` of a layer whose matrix and offsets start `weights`, and what comes after them.
+/// `x W + b` of the layer whose matrix and offsets are at the start of `weights`, and the weights that follow
+/// them.
 fn layer<'a, const IN: usize, const OUT: usize>(
     x: &[f64; IN],
     weights: &'a [f64],
@@ -74,7 +86,7 @@ mod tests {
     fn a_network_of_few_weights_is_its_formula() {
         assert_eq!(NEURAL_FLOATS, 675);
         let mut weights = vec![0.0; NEURAL_FLOATS];
-        // cos(theta_d) goes through one unit a layer to the green channel.
+        // cos(theta_d) goes through one unit per layer to the green channel.
         weights[5 * HIDDEN + 4] = 2.0;
         weights[INPUTS * HIDDEN + 4] = -0.5;
         let second = INPUTS * HIDDEN + HIDDEN;
@@ -91,8 +103,8 @@ mod tests {
         let (wi, wo) = angles.to_directions();
         assert!((brdf.eval(&wi, &wo)[1] - expected).abs() < 1e-9);
         assert_eq!(brdf.eval(&-wi, &wo), [0.0; 3]);
-        assert!(NeuralBrdf::new(weights[1..].to_vec()).is_none());
+        assert!(NeuralBrdf::new(weights[1..].to_vec()).is_err());
         weights[0] = f64::NAN;
-        assert!(NeuralBrdf::new(weights).is_none());
+        assert!(NeuralBrdf::new(weights).is_err());
     }
 }

@@ -11,9 +11,9 @@ use crate::brdf::{Brdf, Rgb};
 /// `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, r . wo)^n`, with `r = 2 (wi . n) n - wi` the mirrored
 /// light direction.
 ///
-/// Source: E. P. Lafortune and Y. D. Willems, "Using the Modified Phong Reflectance Model for Physically Based
-/// Rendering" (1994); the lobe is that of B. T. Phong, "Illumination for Computer Generated Pictures" (1975).
-/// At normal incidence the albedo is exactly `diffuse + specular`, elsewhere it is less: keep
+/// Source: E. P. Lafortune and Y. D. Willems, "Using the Modified Phong Reflectance Model for Physically
+/// Based Rendering" (1994); the lobe is that of B. T. Phong, "Illumination for Computer Generated Pictures"
+/// (1975). At normal incidence the albedo is exactly `diffuse + specular`, elsewhere it is less: keep
 /// `diffuse + specular <= 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Phong {

@@ -14,10 +14,10 @@ use crate::brdf::{Brdf, Rgb};
 /// - `F = f0 - f1 cos_d + (1 - f0)(1 - cos_d)^5`;
 /// - `G(t) = 1 + lambda (1 - exp(c max(0, t - theta0)^k))`, clamped to `[0, 1]`, `t` in radians.
 ///
-/// Source: M. M. Bagher, C. Soler and N. Holzschuch, "Accurate Fitting of Measured Reflectances Using a Shifted
-/// Gamma Micro-facet Distribution" (2012), in the form of the parameters published with it. Reciprocal. A
-/// negative value, which a negative `F` can give, is taken as 0. No parameter bounds its albedo: the published
-/// fits follow measurements.
+/// Source: M. M. Bagher, C. Soler and N. Holzschuch, "Accurate Fitting of Measured Reflectances Using a
+/// Shifted Gamma Micro-facet Distribution" (2012), in the form of the parameters published with it.
+/// Reciprocal. `F` can be negative; a negative value of `f` is replaced by 0. No parameter bounds the albedo:
+/// the published fits follow measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sgd {
     /// Diffuse albedo (`rho_d`).
@@ -28,7 +28,7 @@ pub struct Sgd {
     pub alpha: Rgb,
     /// Decay of the distribution's tail.
     pub p: Rgb,
-    /// Fresnel reflectance where `cos_d = 0` before the last term is added.
+    /// Constant part of the Fresnel term: its value at `cos_d = 0` before the last term is added.
     pub f0: Rgb,
     /// Slope of the Fresnel term in `cos_d`.
     pub f1: Rgb,
@@ -40,12 +40,12 @@ pub struct Sgd {
     pub c: Rgb,
     /// Power of the shadowing's exponent, positive.
     pub k: Rgb,
-    /// Polar angle from which on there is shadowing, radians.
+    /// Polar angle beyond which there is shadowing, radians.
     pub theta0: Rgb,
 }
 
 impl Default for Sgd {
-    /// A grey gloss; `kappa` normalises the distribution (`exp(alpha) / alpha` at `p = 0`).
+    /// A grey glossy material; `kappa` normalises the distribution (`exp(alpha) / alpha` at `p = 0`).
     fn default() -> Self {
         Self {
             diffuse: [0.2; 3],
@@ -82,7 +82,7 @@ impl Sgd {
     /// `G` of one channel at one polar angle.
     fn shadowing(&self, channel: usize, theta: f64) -> f64 {
         let excess = (theta - self.theta0[channel]).max(0.0).powf(self.k[channel]);
-        // exp(700) is finite, and beyond any clamp.
+        // exp(700) is finite, and the result is clamped anyway.
         let exponent = (self.c[channel] * excess).min(700.0);
         (1.0 - self.lambda[channel] * exponent.exp_m1()).clamp(0.0, 1.0)
     }

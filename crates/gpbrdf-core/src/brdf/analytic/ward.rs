@@ -13,16 +13,16 @@ use crate::brdf::{Brdf, Rgb};
 /// / (4 pi alpha_x alpha_y)`.
 ///
 /// Source: G. J. Ward, "Measuring and Modeling Anisotropic Reflection" (1992): eq. 5a, and eq. 4 where
-/// `alpha_x = alpha_y`. Only then is it isotropic, as tables ask; otherwise half-difference angles are read
-/// with the half vector above the x axis. Reciprocal. The lobe's albedo is close to `specular` at small
-/// incidence and slopes, and falls towards grazing.
+/// `alpha_x = alpha_y`. Only in that case is the model isotropic, as tables require; otherwise
+/// half-difference angles are evaluated with the half vector above the x axis. Reciprocal. The lobe's albedo
+/// is close to `specular` where incidence and slopes are small, and falls towards grazing angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ward {
     /// Diffuse albedo.
     pub diffuse: Rgb,
     /// Weight of the lobe.
     pub specular: Rgb,
-    /// Standard deviation of the slope along x, positive; Ward takes it as at most about 0.2.
+    /// Standard deviation of the slope along x, positive; Ward assumes at most about 0.2.
     pub alpha_x: f64,
     /// Standard deviation of the slope along y.
     pub alpha_y: f64,

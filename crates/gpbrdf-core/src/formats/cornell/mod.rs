@@ -1,8 +1,8 @@
 //! Cornell `.brdf` measurements: scattered samples with spectra, as text.
 //!
-//! `#` starts a comment. The number of wavelengths, the wavelengths in nm, then a line per sample:
-//! `theta_i phi_i theta_s phi_s` in radians and `f` in sr^-1 at each wavelength. Source: the Light Measurement
-//! Laboratory of Cornell University's Program of Computer Graphics.
+//! The file holds the number of wavelengths, the wavelengths in nm, then one line per sample:
+//! `theta_i phi_i theta_s phi_s` in radians and `f` in sr^-1 at each wavelength. `#` starts a comment.
+//! Source: the Light Measurement Laboratory of Cornell University's Program of Computer Graphics.
 
 mod spectrum;
 
@@ -17,7 +17,7 @@ use crate::formats::cornell::spectrum::SpectrumToRgb;
 use crate::formats::read::read_bytes;
 use crate::sample::{Sample, SampleSet};
 
-/// Scattered spectra of the Cornell database.
+/// Scattered measurements with spectra, as in the Cornell database.
 pub(crate) const FORMAT: Format = Format {
     name: "Cornell measurement",
     file: "Cornell .brdf",
@@ -29,15 +29,15 @@ pub(crate) const FORMAT: Format = Format {
 
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 28;
-/// More wavelengths than any instrument has.
+/// Limit on the number of wavelengths, which no instrument reaches.
 const MAX_WAVELENGTHS: usize = 10_000;
 
-/// Reads a Cornell `.brdf` file. Spectra become linear sRGB by the CIE 1931 2-degree observer under D65;
-/// out-of-gamut channels are set to 0.
+/// Reads a Cornell `.brdf` file. Spectra are converted to linear sRGB for the CIE 1931 2-degree observer
+/// under D65; out-of-gamut channels are set to 0.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] with the line when it is not of this format, a
-/// number is not finite or a direction is below the horizon.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`], which names the line, when it is not of
+/// this format, a number is not finite or a direction is below the horizon.
 pub fn read_cornell(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
     parse(&read_bytes(path, "Cornell", LIMIT_BYTES)?, path)
@@ -54,7 +54,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
         return Err(wrong("the number of wavelengths".to_owned(), "an empty file".to_owned()));
     }
     let text = String::from_utf8_lossy(bytes);
-    // Lines with content, numbered from 1.
+    // The lines that have content, numbered from 1.
     let mut lines = text
         .lines()
         .zip(1..)
@@ -118,7 +118,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
             }
         }
         for (name, phi) in [("phi_i", *phi_i), ("phi_s", *phi_s)] {
-            // The files round angles to six digits.
+            // The files round angles to six digits, so a full turn can be exceeded slightly.
             if phi.abs() > 2.0 * PI + 1e-3 {
                 return Err(wrong(format!("{name} from -2 pi to 2 pi on line {at}"), phi.to_string()));
             }

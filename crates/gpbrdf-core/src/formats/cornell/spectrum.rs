@@ -1,8 +1,9 @@
-//! Spectra to linear sRGB.
+//! Conversion of spectra to linear sRGB.
 //!
-//! CIE 1931 2-degree observer under illuminant D65, both at 380 to 780 nm in steps of 10 nm (CIE 15:2004, tables
-//! T.1 and T.4): `X = X_n sum f S x_bar / sum S x_bar` and alike for `Y`, `Z`, with the white point `X_n = 0.95047`,
-//! `Y_n = 1`, `Z_n = 1.08883`; then the matrix of IEC 61966-2-1. A perfect reflector is (1, 1, 1).
+//! The CIE 1931 2-degree observer and illuminant D65 are tabulated at 380 to 780 nm in steps of 10 nm (CIE
+//! 15:2004, tables T.1 and T.4): `X = X_n sum f S x_bar / sum S x_bar`, and the same for `Y` and `Z`, with
+//! the white point `X_n = 0.95047`, `Y_n = 1`, `Z_n = 1.08883`. The matrix of IEC 61966-2-1 gives sRGB. A
+//! perfect reflector becomes (1, 1, 1).
 
 use crate::brdf::Rgb;
 
@@ -57,10 +58,10 @@ const OBSERVER_D65: [[f64; 4]; 41] = [
     [0.000042, 0.000015, 0.000000, 63.3828],
 ];
 
-/// XYZ of D65 (ASTM E308), which sums over steps of 10 nm meet to 1e-3 only.
+/// XYZ of D65 (ASTM E308). Sums over steps of 10 nm meet it only to 1e-3.
 const WHITE: [f64; 3] = [0.950_47, 1.0, 1.088_83];
 
-/// Linear sRGB from XYZ (IEC 61966-2-1).
+/// The matrix from XYZ to linear sRGB (IEC 61966-2-1).
 const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
     [3.240_454_2, -1.537_138_5, -0.498_531_4],
     [-0.969_266_0, 1.876_010_8, 0.041_556_0],
@@ -75,8 +76,8 @@ pub(crate) struct SpectrumToRgb {
 }
 
 impl SpectrumToRgb {
-    /// The map for spectra at `wavelengths`, nm: linear in between, constant beyond. `None` unless they
-    /// increase, are finite and reach into 380 to 780 nm.
+    /// The map for spectra at `wavelengths`, nm. Spectra are linear between them and constant beyond them.
+    /// `None` unless the wavelengths increase, are finite and reach into the range of 380 to 780 nm.
     pub(crate) fn new(wavelengths: &[f64]) -> Option<Self> {
         let (&first, &last) = (wavelengths.first()?, wavelengths.last()?);
         let increasing = wavelengths.windows(2).all(|pair| pair[0] < pair[1]);
@@ -102,7 +103,7 @@ impl SpectrumToRgb {
         Some(Self { weights })
     }
 
-    /// Linear sRGB of one spectrum, out-of-gamut (negative) channels set to 0.
+    /// Linear sRGB of one spectrum; out-of-gamut (negative) channels are set to 0.
     pub(crate) fn rgb(&self, spectrum: impl IntoIterator<Item = f64>) -> Rgb {
         let mut sum = [0.0; 3];
         for (value, weights) in spectrum.into_iter().zip(&self.weights) {
@@ -118,7 +119,7 @@ impl SpectrumToRgb {
 mod tests {
     use super::*;
 
-    /// Mistyped figures would show here.
+    /// Mistyped numbers would be found here.
     #[test]
     fn tables_have_the_published_sums() {
         let sum = |f: &dyn Fn(&[f64; 4]) -> f64| OBSERVER_D65.iter().map(f).sum::<f64>();
@@ -130,7 +131,7 @@ mod tests {
         // The white point of D65: 95.047, 100, 108.883.
         let (x, y, z) = (sum(&|r| r[0] * r[3]), sum(&|r| r[1] * r[3]), sum(&|r| r[2] * r[3]));
         assert!((x / y - 0.950_47).abs() < 4e-4 && (z / y - 1.088_83).abs() < 8e-4, "{} {}", x / y, z / y);
-        // Smooth but for D65: no digit has slipped in the observer.
+        // All but D65 is smooth: no digit of the observer is mistyped.
         for k in 0..3 {
             for five in OBSERVER_D65.windows(5) {
                 let fourth = five[0][k] - 4.0 * five[1][k] + 6.0 * five[2][k] - 4.0 * five[3][k] + five[4][k];

@@ -1,4 +1,4 @@
-//! Comma-separated values: measured samples and directions, and published weights.
+//! Comma-separated values: measured samples, directions, and published weights.
 
 pub(crate) mod neural;
 pub(crate) mod samples;

@@ -8,7 +8,7 @@ use crate::formats::read::read_bytes;
 
 const FORMAT: &str = "Neural BRDF";
 
-/// More than a thousand materials.
+/// Limit on the size of a file; it holds more than a thousand materials.
 const MAX_BYTES: u64 = 1 << 24;
 
 /// The columns after `material`, in the order of [`NeuralBrdf::new`].
@@ -26,11 +26,12 @@ fn columns() -> Vec<String> {
         .collect()
 }
 
-/// Reads a CSV of Neural BRDF fits, a row a material: a column `material` and 675 columns `w1_0_0` to `b3_2`, found by
-/// their names. The names and networks, in the order of the rows.
+/// Reads a CSV file of Neural BRDF fits with one row per material. The column `material` and the 675 columns
+/// `w1_0_0` to `b3_2` are found by their names. Returns names and networks in the order of the rows.
 ///
 /// # Errors
-/// A file that cannot be read, a column that is missing, or a value that is no finite number.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when a column is missing, a value is not a
+/// finite number, or there is no row.
 pub fn read_neural_csv(path: &Path) -> Result<Vec<(String, NeuralBrdf)>> {
     let bytes = read_bytes(path, FORMAT, MAX_BYTES)?;
     let bad = |expected: String, found: String| Error::Format {
@@ -58,7 +59,7 @@ pub fn read_neural_csv(path: &Path) -> Result<Vec<(String, NeuralBrdf)>> {
             weights.push(value.ok_or_else(said)?);
         }
         let name = record.get(material).unwrap_or("").to_owned();
-        fits.extend(NeuralBrdf::new(weights).map(|brdf| (name, brdf)));
+        fits.push((name, NeuralBrdf::new(weights)?));
     }
     if fits.is_empty() {
         return Err(bad("at least one row of weights".into(), "none".into()));

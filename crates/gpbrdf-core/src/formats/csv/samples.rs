@@ -1,13 +1,14 @@
 //! Measured samples and directions as comma-separated values.
 //!
-//! The first line that is no comment (`#`) names the columns, in any order; other columns are ignored:
+//! The first line that is not a comment (`#`) names the columns, in any order. Columns with other names are
+//! ignored:
 //!
 //! - directions: `theta_i, phi_i, theta_o, phi_o` (polar angle and azimuth of light and viewer), or
-//!   `theta_h, theta_d, phi_d` (half-difference angles); where a file has both, the first counts;
-//! - values in sr^-1, cosine not included: `r, g, b` (linear sRGB), or one grey column `f` or `value`.
+//!   `theta_h, theta_d, phi_d` (half-difference angles); if a file has both, the former are used;
+//! - values in sr^-1, without the cosine: `r, g, b` (linear sRGB), or one grey column `f` or `value`.
 //!
-//! An angle's unit is part of its name: `theta_i_deg` or `theta_i [deg]`, `theta_i_rad` or `theta_i [rad]`. A
-//! bare `theta_i` is in degrees. All angles of a file have the same unit.
+//! The unit of an angle is part of its name: `theta_i_deg` or `theta_i [deg]`, `theta_i_rad` or
+//! `theta_i [rad]`. A bare `theta_i` is in degrees. All angles of a file must have the same unit.
 
 use crate::formats::format::Format;
 use crate::formats::source::Content;
@@ -24,7 +25,7 @@ use crate::brdf::angles::{HalfDiff, direction, fold_phi_d};
 use crate::formats::read::read_bytes;
 use crate::sample::{Sample, SampleSet};
 
-/// Measured samples or directions.
+/// Samples or directions of measurements.
 pub(crate) const FORMAT: Format = Format {
     name: "samples CSV",
     file: "samples CSV",
@@ -38,12 +39,12 @@ const LIMIT_BYTES: u64 = 1 << 30;
 const LIGHT_VIEWER: &[&str] = &["theta_i", "phi_i", "theta_o", "phi_o"];
 const HALF_DIFF: &[&str] = &["theta_h", "theta_d", "phi_d"];
 
-/// Directions read from a file, with their original text for a result to repeat.
+/// Directions read from a file, with their original text, so that a result can repeat it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Directions {
-    /// Names of the direction columns as the file has them, four or three.
+    /// Names of the direction columns as they are in the file, four or three.
     pub columns: Vec<String>,
-    /// The text of those columns, one entry for each of [`Directions::angles`].
+    /// The text of those columns, one row for each of [`Directions::angles`].
     pub rows: Vec<Vec<String>>,
     /// The half-difference angles of each row.
     pub angles: Vec<HalfDiff>,
@@ -55,13 +56,13 @@ enum Unit {
     Radians,
 }
 
-/// Where in a record to look, and how to read it.
+/// Which fields of a record are read, and in which unit.
 struct Layout {
     /// [`LIGHT_VIEWER`] or [`HALF_DIFF`].
     names: &'static [&'static str],
     angles: Vec<usize>,
     unit: Unit,
-    /// Three columns, one, or none where only directions are read.
+    /// Indices of three columns or of one; empty if only directions are read.
     values: Vec<usize>,
 }
 
@@ -161,7 +162,7 @@ impl Source<'_> {
         Ok(Layout { names, angles: chosen.iter().map(|column| column.1).collect(), unit, values })
     }
 
-    /// One number of a record.
+    /// Parses one number of a record.
     fn number(&self, record: &csv::StringRecord, header: &csv::StringRecord, index: usize) -> Result<f64> {
         let field = record.get(index);
         match field.and_then(|field| field.parse::<f64>().ok()).filter(|value| value.is_finite()) {
@@ -177,7 +178,7 @@ impl Source<'_> {
         }
     }
 
-    /// The directions of a record.
+    /// Parses the directions of a record.
     fn directions(
         &self,
         record: &csv::StringRecord,
@@ -265,7 +266,7 @@ impl Source<'_> {
             .read_record(&mut record)
             .map_err(|error| self.wrong("UTF-8 text in comma-separated columns", error.to_string()))?
         {
-            // A line of blanks, or a comment at the very end.
+            // This is a blank line, or a comment at the very end.
             if record.len() == 1 && record[0].is_empty() {
                 continue;
             }
@@ -314,7 +315,7 @@ fn place(record: &csv::StringRecord, header: &csv::StringRecord, index: usize) -
     format!("in column `{}` on line {}", shortened(header.get(index).unwrap_or("")), line_of(record))
 }
 
-/// At most 40 characters of a field, for messages.
+/// At most 40 characters of a field, for error messages.
 fn shortened(text: &str) -> String {
     let mut start: String = text.chars().filter(|c| !c.is_control()).take(40).collect();
     if start.len() < text.len() {
@@ -323,12 +324,12 @@ fn shortened(text: &str) -> String {
     start
 }
 
-/// Reads measured samples. Comment lines before the header are their description.
+/// Reads measured samples. Comment lines before the header become their description.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] with line and column when a column is missing,
-/// a number is not finite, a value negative, an angle out of range or a direction below the horizon, and when
-/// the file has no rows.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`], which names line and column, when a column
+/// is missing, a number is not finite, a value is negative or too large for f32, an angle is out of range or
+/// a direction is below the horizon, and when the file has no rows.
 pub fn read_samples_csv(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
     parse_samples(&read_bytes(path, "samples CSV", LIMIT_BYTES)?, path)
@@ -352,10 +353,10 @@ fn parse_samples(bytes: &[u8], path: &Path) -> Result<SampleSet> {
     Ok(SampleSet { description: comments.join("\n"), ..samples.into_iter().collect() })
 }
 
-/// Reads directions; columns of values, if there are any, are ignored.
+/// Reads directions; columns of values are ignored.
 ///
 /// # Errors
-/// As [`read_samples_csv`].
+/// The same as for [`read_samples_csv`].
 pub fn read_directions_csv(path: impl AsRef<Path>) -> Result<Directions> {
     let path = path.as_ref();
     parse_directions(&read_bytes(path, "samples CSV", LIMIT_BYTES)?, path)
@@ -379,21 +380,21 @@ fn parse_directions(bytes: &[u8], path: &Path) -> Result<Directions> {
     Ok(directions)
 }
 
-/// Writes samples with the columns `theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, r, g, b`. Values come back
-/// bit-equal, directions to rounding.
+/// Writes samples with the columns `theta_i_deg, phi_i_deg, theta_o_deg, phi_o_deg, r, g, b`. When they are
+/// read back, values are equal to the bit and directions to rounding.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be written; nothing is left then.
+/// [`Error::Io`] when the file cannot be written; no part of it is left then.
 pub fn write_samples_csv(path: impl AsRef<Path>, samples: &SampleSet) -> Result<()> {
     let mut file = AtomicFile::create(path.as_ref())?;
     write_samples_csv_to(&mut file, samples).map_err(|source| Error::write(path.as_ref(), source))?;
     file.commit()
 }
 
-/// [`write_samples_csv`] to anything.
+/// Like [`write_samples_csv`], but writes to any writer.
 ///
 /// # Errors
-/// What `to` answers.
+/// Any error of `to`.
 pub fn write_samples_csv_to(mut to: impl Write, samples: &SampleSet) -> io::Result<()> {
     for line in samples.description.lines() {
         writeln!(to, "# {line}")?;

@@ -6,10 +6,11 @@ use exr::prelude::{Image, SpecificChannels, WritableImage};
 
 use crate::brdf::Rgb;
 
-/// Writes a `width x height` picture of linear RGB, rows from top to bottom, as f32; `to` should be buffered.
+/// Writes a `width x height` picture of linear RGB, rows from top to bottom, as f32. `to` should be buffered.
 ///
 /// # Errors
-/// What `to` answers, or [`io::ErrorKind::InvalidInput`] unless there are `width x height` pixels.
+/// Any error of `to`, or [`io::ErrorKind::InvalidInput`] unless there are `width x height` pixels, at least
+/// one.
 pub fn write_image_exr(to: impl Write + Seek, width: usize, height: usize, pixels: &[Rgb]) -> io::Result<()> {
     if width == 0 || width.checked_mul(height) != Some(pixels.len()) || height == 0 {
         let what = format!("expected {width} x {height} pixels, at least one, found {}", pixels.len());

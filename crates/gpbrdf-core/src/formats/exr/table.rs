@@ -1,11 +1,13 @@
 //! Baked tables as `OpenEXR`.
 //!
-//! One part (layer) per quantity, for example `mean` and `sigma`, each an image of 180 x 8100 pixels in f32:
-//! `x = i_phi_d`, `y = i_theta_d + 90 i_theta_h`, which is the order of [`cell_index`](crate::cell_index). The
-//! attribute `comments` of a part says what it holds, `unit` its unit and `layout` the meaning of `x` and `y`.
+//! The file has one part (layer) per quantity, for example `mean` and `sigma`. Each is an image of 180 x 8100
+//! pixels in f32 with `x = i_phi_d` and `y = i_theta_d + 90 i_theta_h`, which is the order of
+//! [`cell_index`](crate::brdf::cell_index). The attribute `comments` of a part says what it holds, `unit`
+//! gives its unit and `layout` the meaning of `x` and `y`.
 //!
-//! Written uncompressed: mean (RGB) and sigma (one channel), 23.7 MB, take 28 ms on two cores, against 134 ms
-//! with RLE (no smaller) and 1040 ms with ZIP16 (18.1 MB): the low bits of measured f32 values do not compress.
+//! Parts are written uncompressed. Mean (RGB) and sigma (one channel), 23.7 MB, then take 28 ms on two cores,
+//! against 134 ms with RLE (no smaller) and 1040 ms with ZIP16 (18.1 MB): the low bits of measured f32 values
+//! cannot be compressed.
 
 use crate::formats::format::Format;
 use crate::formats::source::Content;
@@ -40,10 +42,10 @@ pub(crate) const FORMAT: Format = Format {
 const WIDTH: usize = N_PHI_D;
 const HEIGHT: usize = N_THETA_D * N_THETA_H;
 
-/// More blocks than any sensible file of this kind has.
+/// Limit on the number of blocks, far above that of any sensible file of this kind.
 const MAX_BLOCKS: usize = 1 << 20;
 
-/// The values of one part, in MERL order, one per cell of a table.
+/// The values of one part in MERL order, one per cell of a table.
 #[derive(Clone, Copy, Debug)]
 pub enum ExrChannels<'a> {
     /// Channels `R`, `G`, `B`.
@@ -55,7 +57,7 @@ pub enum ExrChannels<'a> {
 /// One part of an `OpenEXR` file.
 #[derive(Clone, Copy, Debug)]
 pub struct ExrPart<'a> {
-    /// Name of the part, for example `mean`; different from the others'.
+    /// Name of the part, for example `mean`. No two parts of a file have the same name.
     pub name: &'a str,
     /// What the part holds, for people.
     pub description: &'a str,
@@ -73,7 +75,7 @@ impl ExrChannels<'_> {
         }
     }
 
-    /// The bytes of one image row, channel after channel in alphabetical order (B, G, R).
+    /// The bytes of one image row, channel by channel in alphabetical order (B, G, R).
     fn row(&self, y: usize) -> Vec<u8> {
         let cells = y * WIDTH..(y + 1) * WIDTH;
         match self {
@@ -89,21 +91,21 @@ impl ExrChannels<'_> {
     }
 }
 
-/// Writes a table's quantities as the parts of an `OpenEXR` file.
+/// Writes quantities of a table as the parts of an `OpenEXR` file.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be written, there is no part, two parts have one name, or a part does not
-/// have 1,458,000 values; nothing is left then.
+/// [`Error::Io`] when the file cannot be written, there is no part, two parts have the same name, or a part
+/// does not have 1,458,000 values; no part of the file is left then.
 pub fn write_table_exr(path: impl AsRef<Path>, parts: &[ExrPart<'_>]) -> Result<()> {
     let mut file = AtomicFile::create(path.as_ref())?;
     write_table_exr_to(&mut file, parts).map_err(|source| Error::write(path.as_ref(), source))?;
     file.commit()
 }
 
-/// [`write_table_exr`] to anything, row by row; `to` should be buffered.
+/// Like [`write_table_exr`], but writes to any writer, row by row. `to` should be buffered.
 ///
 /// # Errors
-/// What `to` answers, or [`io::ErrorKind::InvalidInput`] for unfit parts.
+/// Any error of `to`, or [`io::ErrorKind::InvalidInput`] if the parts are not as described there.
 pub fn write_table_exr_to(to: impl Write + Seek, parts: &[ExrPart<'_>]) -> io::Result<()> {
     let unfit = |what: String| io::Error::new(io::ErrorKind::InvalidInput, what);
     if parts.is_empty() {
@@ -160,7 +162,7 @@ fn header(part: &ExrPart<'_>) -> Header {
     header
 }
 
-/// Two attributes in one map would be written in an order that changes from run to run.
+/// A map of one attribute. With two in it, the order in which they are written would change from run to run.
 fn one_attribute(name: &str, value: &str) -> HashMap<Text, AttributeValue> {
     HashMap::from([(text(name), AttributeValue::Text(text(value)))])
 }
@@ -178,11 +180,11 @@ fn into_io(error: exr::error::Error) -> io::Error {
     }
 }
 
-/// Reads a table back: the part called `mean`, else the first one with channels `R`, `G`, `B`.
+/// Reads a table: the part called `mean`, else the first part with channels `R`, `G`, `B`.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, has no RGB part, the part
-/// is not 180 x 8100 pixels of floating-point numbers, or a value is not finite.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, has no RGB part, the
+/// part is not an image of 180 x 8100 floating-point pixels, or a value is not finite.
 pub fn read_table_exr(path: impl AsRef<Path>) -> Result<BrdfTable> {
     let path = path.as_ref();
     let (file, _) = open(path)?;
@@ -239,7 +241,7 @@ fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
     let chunks = reader
         .filter_chunks(true, |meta, _, block| {
             let wanted = block.layer == layer && block.level == Vec2(0, 0);
-            // The last rows of the other parts show that the file is whole.
+            // The last rows of the other parts are read only to check that the file is whole.
             let end = block.pixel_position.y() + block.pixel_size.y();
             wanted || end >= meta.headers[block.layer].layer_size.y()
         })
@@ -291,7 +293,8 @@ fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
     BrdfTable::from_values(values)
 }
 
-/// Where a flat part has its channels R, G, B, if it has them as whole floating-point images.
+/// The places of R, G and B among the channels of a part, if it has all three as floating-point images at
+/// full resolution.
 fn rgb_channels(header: &Header) -> Option<[usize; 3]> {
     let place = |name: &str| {
         header.channels.list.iter().position(|channel| {
@@ -332,7 +335,7 @@ mod tests {
         decode(bytes).unwrap_err().to_string()
     }
 
-    /// Read by the library's own high-level reader: names, positions, attributes.
+    /// The file is read by the library's own high-level reader, with names, positions and attributes.
     #[test]
     fn other_readers_find_the_parts() {
         use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
@@ -383,7 +386,7 @@ mod tests {
         assert!(message(&encode(&[sigma])).ends_with("channels R, G and B, found channels Y"));
     }
 
-    /// Files of other programs: half floats, compressed tiles.
+    /// Other programs write half floats and compressed tiles.
     #[test]
     fn other_encodings_are_read() {
         use exr::prelude::{Encoding, Image, Layer, SpecificChannels, WritableImage};
@@ -420,7 +423,7 @@ mod tests {
     fn damaged_files_never_panic() {
         let table = table();
         let good = encode(&[part("mean", ExrChannels::Rgb(table.values()))]);
-        // All the structure is in the header, the offset table and the first blocks.
+        // All structure is in the header, the offset table and the first blocks.
         let (head, rest) = good.split_at(1 << 17);
         assert!(message(head).contains("OpenEXR"));
         for bytes in mutations(&head[..1 << 12], 1 << 12, 6, 300) {

@@ -1,9 +1,9 @@
 //! MERL `.binary` files.
 //!
-//! Layout, little-endian: three `i32` dimensions 90, 90, 180; then three planes of 1,458,000 `f64`, red, green
-//! and blue, in the order of [`cell_index`](crate::cell_index). A stored value times 1/1500, 1.15/1500 and
-//! 1.66/1500 is `f` in sr^-1; negative means "no data". Source: W. Matusik et al., "A Data-Driven Reflectance
-//! Model" (2003), and the reader published with the database.
+//! Layout, little-endian: three `i32` dimensions 90, 90, 180; then three planes of 1,458,000 `f64`, red,
+//! green and blue, in the order of [`cell_index`](crate::brdf::cell_index). A stored value times 1/1500,
+//! 1.15/1500 or 1.66/1500 is `f` in sr^-1; a negative value means that there is no data. Source: W. Matusik
+//! et al., "A Data-Driven Reflectance Model" (2003), and the reader published with the database.
 
 mod names;
 
@@ -20,7 +20,7 @@ use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 use crate::formats::format::Head;
 use crate::formats::read::{NotFinite, open};
 
-/// A table of the MERL database, or one of its shape.
+/// A table of the MERL database, or another one in its format.
 pub(crate) const FORMAT: Format = Format {
     name: "MERL table",
     file: "MERL .binary",
@@ -34,23 +34,23 @@ pub const MERL_BYTES: u64 = 12 + 3 * 8 * N_CELLS as u64;
 /// Scale of each plane, sr^-1 per stored unit.
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
-/// Cells converted at a time: one `theta_h` slab, 130 kB of file.
+/// Number of cells converted at a time: one `theta_h` slab, 130 kB of the file.
 const CHUNK: usize = N_THETA_D * N_PHI_D;
 
-/// Reads a MERL `.binary` file. Negative values ("no data") are kept.
+/// Reads a MERL `.binary` file. Negative values, which mean that there is no data, are kept.
 ///
-/// Streams the file: beside the table it takes 130 kB of memory.
+/// Streams the file: apart from the table it takes 130 kB of memory.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when the dimensions are not 90 x 90 x 180, the
-/// size is not 34,992,012 bytes, or a value is not a finite number.
+/// [`Error::Io`] when the file cannot be read; [`Error::Format`] when the dimensions are not 90 x 90 x 180,
+/// the size is not 34,992,012 bytes, or a value is not a finite number.
 pub fn read_merl(path: impl AsRef<Path>) -> Result<BrdfTable> {
     let path = path.as_ref();
     let (file, length) = open(path)?;
     read(file, length, path)
 }
 
-/// [`read_merl`] from anything; `length` is the size where it is known beforehand.
+/// Like [`read_merl`], from any reader; `length` is the size if it is known beforehand.
 fn read(mut from: impl Read, length: Option<u64>, path: &Path) -> Result<BrdfTable> {
     let wrong = |expected: String, found: String| Error::Format {
         format: "MERL",
@@ -115,14 +115,15 @@ fn read(mut from: impl Read, length: Option<u64>, path: &Path) -> Result<BrdfTab
     BrdfTable::from_values(values)
 }
 
-/// Dimensions of a table at the start; or any binary content in a file with the name of one.
+/// Whether the file starts with the dimensions of a table, or is called `*.binary` and holds any binary
+/// content.
 fn recognises(head: &Head<'_>) -> bool {
     let header = head.bytes.first_chunk::<12>();
     header.is_some_and(|header| is_merl(dimensions(header), head.length))
         || (head.text.is_none() && head.named_binary)
 }
 
-/// Whether three integers at the start of a file of `length` bytes are those of a MERL-like table.
+/// Whether three integers at the start of a file of `length` bytes are the dimensions of a MERL-like table.
 fn is_merl(dims: [i32; 3], length: u64) -> bool {
     let [a, b, c] = dims.map(|d| u64::try_from(d).unwrap_or(0));
     let plausible = [a, b, c].iter().all(|d| (1..=4096).contains(d));
@@ -135,7 +136,7 @@ fn dimensions(header: &[u8; 12]) -> [i32; 3] {
     std::array::from_fn(|k| i32::from_le_bytes(words[k]))
 }
 
-/// Reads until `buffer` is full or the source ends; the number of bytes read.
+/// Reads until `buffer` is full or the source ends. Returns the number of bytes read.
 fn fill(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < buffer.len() {
@@ -149,10 +150,11 @@ fn fill(from: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
     Ok(filled)
 }
 
-/// Writes `table` as a MERL `.binary` file of 34,992,012 bytes. What [`read_merl`] reads back is bit-equal.
+/// Writes `table` as a MERL `.binary` file of 34,992,012 bytes. [`read_merl`] reads it back equal to the bit.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be written or a value of the table is not finite; nothing is left then.
+/// [`Error::Io`] when the file cannot be written or a value of the table is not finite; no part of the file
+/// is left then.
 pub fn write_merl(path: impl AsRef<Path>, table: &BrdfTable) -> Result<()> {
     let mut file = AtomicFile::create(path.as_ref())?;
     write_merl_to(&mut file, table).map_err(|source| Error::write(path.as_ref(), source))?;
@@ -162,7 +164,7 @@ pub fn write_merl(path: impl AsRef<Path>, table: &BrdfTable) -> Result<()> {
 /// Writes `table` in MERL layout to `to`, in pieces of 130 kB.
 ///
 /// # Errors
-/// What `to` answers, or [`io::ErrorKind::InvalidData`] before the first byte when a value is not finite.
+/// Any error of `to`, or [`io::ErrorKind::InvalidData`] before the first byte when a value is not finite.
 pub fn write_merl_to(mut to: impl Write, table: &BrdfTable) -> io::Result<()> {
     NotFinite::check(table.values())?;
     for dimension in [N_THETA_H, N_THETA_D, N_PHI_D] {
@@ -190,7 +192,7 @@ mod tests {
         table.values().iter().map(|rgb| rgb.map(f32::to_bits)).collect()
     }
 
-    /// Every finite f32 bit pattern is as likely as any other: subnormal, huge, negative.
+    /// Every finite f32 bit pattern is equally likely, so that values are subnormal, huge or negative, too.
     fn wild_table() -> BrdfTable {
         let mut random = Random::new(7);
         let mut values: Vec<[f32; 3]> = (0..N_CELLS)
@@ -271,7 +273,7 @@ mod tests {
         let found = message(&wrong);
         assert!(found.contains("found 3 values that are not"), "{found}");
         assert!(found.contains("channel G, theta_h 1, theta_d 1, phi_d 1"), "{found}");
-        // Without a length known beforehand, as from a pipe.
+        // The length is not known beforehand here, as for a pipe.
         let piped = read(&good[..1024], None, Path::new("p")).unwrap_err().to_string();
         assert!(piped.ends_with("found 1024 bytes"), "{piped}");
         assert!(read(&[&good[..], &[0]].concat()[..], None, Path::new("p")).is_err());

@@ -1,8 +1,8 @@
-//! The published sums of the MERL database.
+//! The published checksums of the MERL database.
 
 /// Names and SHA-256 sums of the 100 `.binary` files of the MERL BRDF database, sorted by name.
 ///
-/// Figures published for these files; each file has 34,992,012 bytes.
+/// The sums were published for these files. Each file has 34,992,012 bytes.
 static SUMS: [(&str, &str); 100] = [
     ("alum-bronze", "d6506c69e44430bfe8ea676f3950599ca3a6bfb1f46b9906da336d13991bd37d"),
     ("alumina-oxide", "c3e49d638d96245845b5361ccec502af69923bbedd09b74a0a058e3f6e9e90fc"),
@@ -106,7 +106,7 @@ static SUMS: [(&str, &str); 100] = [
     ("yellow-plastic", "cc036db74087f380747a0746d39dd1e4be359c409fa729214a894bd883a4757e"),
 ];
 
-/// The MERL material whose file has this SHA-256 sum, given in hexadecimal of either case.
+/// The MERL material whose file has this SHA-256 sum, given in hexadecimal, upper or lower case.
 #[must_use]
 pub fn merl_material_name(sha256_hex: &str) -> Option<&'static str> {
     SUMS.iter().find(|(_, sum)| sum.eq_ignore_ascii_case(sha256_hex)).map(|&(name, _)| name)

@@ -1,7 +1,7 @@
-//! RGL `.bsdf` measurements (EPFL material database), isotropic and RGB.
+//! RGL `.bsdf` measurements (EPFL material database), isotropic RGB files only.
 //!
-//! J. Dupuy and W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering"
-//! (2018). With `theta_m`, `phi_m` the spherical angles of the half vector `h`,
+//! Source: J. Dupuy and W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and
+//! Rendering" (2018). With `theta_m`, `phi_m` the spherical angles of the half vector `h`:
 //!
 //! ```text
 //! u(theta) = sqrt(2 theta / pi)            v(phi) = (phi + pi) / (2 pi)
@@ -10,8 +10,8 @@
 //! f cos(theta_o) = max(0, rgb(s_x, s_y)) ndf(x, y) / (4 sigma(u(theta_i), v(phi_i)))
 //! ```
 //!
-//! All maps are bilinear on grids over the unit square and linear in `theta_i` between slices. The database's
-//! evaluator returns `f cos(theta_o)`; the cosine is divided out here.
+//! All maps are bilinear on grids over the unit square, and linear in `theta_i` between slices. The
+//! database's evaluator returns `f cos(theta_o)`; this one divides by the cosine.
 
 mod tensor_file;
 
@@ -29,13 +29,13 @@ use crate::brdf::{Brdf, Rgb};
 use crate::formats::read::read_bytes;
 use crate::formats::rgl::tensor_file::{TensorFile, U8};
 
-/// Bytes at the start of a RGL file.
+/// Bytes at the start of an RGL file.
 const MAGIC: &[u8] = b"tensor_file\0";
 
-/// At grazing angles the measurements are extrapolated, so they are evaluated at a cosine of at least this.
+/// Smallest cosine at which measurements are evaluated: closer to the horizon they are extrapolated.
 const MIN_MEASURED_COSINE: f64 = 0.02;
 
-/// The measurement as a reciprocal BRDF up to the horizon.
+/// Reads the measurement as a reciprocal BRDF that is defined up to the horizon.
 fn read_reciprocal(path: &Path) -> Result<Content> {
     let inner = read_rgl(path)?;
     let description = inner.description().to_owned();
@@ -51,10 +51,11 @@ pub(crate) const FORMAT: Format = Format {
     read: read_reciprocal,
 };
 
-/// Larger than every file of the database, spectral and anisotropic ones included.
+/// Limit on the size of a file; every file of the database is smaller, spectral and anisotropic ones
+/// included.
 const LIMIT_BYTES: u64 = 1 << 30;
 
-/// An isotropic RGB measurement of the RGL database. About 1.3 MB.
+/// An isotropic RGB measurement of the RGL database. It takes about 1.3 MB.
 #[derive(Clone)]
 pub struct RglBrdf {
     description: String,
@@ -64,7 +65,7 @@ pub struct RglBrdf {
     ndf: Map,
     /// Projected area of the microfacets, `[y][x]`.
     sigma: Map,
-    /// Whether `rgb` leaves out the factor `ndf / (4 sigma)`.
+    /// Whether `rgb` does not include the factor `ndf / (4 sigma)`.
     jacobian: bool,
     warp: Warp,
     /// Resolution of the colour map.
@@ -87,9 +88,9 @@ struct Map {
 struct Warp {
     height: usize,
     width: usize,
-    /// Density at a node, and its running integral along the row up to it; `[theta_i][y][x]`.
+    /// Density at a node, and its integral along the row from the start to the node; `[theta_i][y][x]`.
     nodes: Vec<[f32; 2]>,
-    /// Integral of all rows up to this one; `[theta_i][y]`.
+    /// Integral over all rows up to this one; `[theta_i][y]`.
     rows: Vec<f32>,
 }
 
@@ -118,8 +119,8 @@ impl Map {
 }
 
 impl Warp {
-    /// Integrates `vndf`, `[theta_i][y][x]`, by the trapezoid rule with unit spacing; the index of a slice
-    /// that is zero everywhere in the error.
+    /// Integrates `vndf`, `[theta_i][y][x]`, by the trapezoid rule with unit spacing. The error is the index
+    /// of a slice that is zero everywhere.
     fn new(height: usize, width: usize, vndf: &[f32]) -> Result<Self, usize> {
         let mut nodes = Vec::with_capacity(vndf.len());
         let mut rows = Vec::with_capacity(vndf.len() / width);
@@ -155,7 +156,8 @@ impl Warp {
         Ok(Self { height, width, nodes, rows })
     }
 
-    /// The point that the warp of the blend of slices `low` and `low + 1` maps to `(x, y)`.
+    /// The point that is mapped to `(x, y)` by the warp of slices `low` and `high`, blended with the weight
+    /// `weight` of `high`.
     fn invert(&self, low: usize, high: usize, weight: f64, x: f64, y: f64) -> (f64, f64) {
         let (i, a) = node(x, self.width);
         let (j, b) = node(y, self.height);
@@ -178,7 +180,7 @@ impl Warp {
         let right = mix(v01, v11, b);
         let along = a * (left + 0.5 * a * (right - left)) + mix(c00, c10, b);
         let total = mix(r0, r1, b);
-        // A row without density is never sampled; any answer does.
+        // A row without density is never sampled, so any value will do.
         let s_x = if total > 0.0 { along / total } else { 0.0 };
         let s_y = m + b * (r0 + 0.5 * b * (r1 - r0));
         (s_x, s_y)
@@ -216,7 +218,7 @@ impl RglBrdf {
         }
         let slices = theta_i.len();
         let sized = |name: &str, found: &[usize], expected: &[usize]| {
-            // Zero stands for any size of at least 2.
+            // A zero in `expected` allows any size of at least 2.
             let fits = |(&have, &want): (&usize, &usize)| if want == 0 { have >= 2 } else { have == want };
             if found.iter().zip(expected).all(fits) {
                 return Ok(());
@@ -272,7 +274,7 @@ impl RglBrdf {
         let theta_i = horizontal_i.atan2(wi.z);
         let theta_m = horizontal_m.atan2(h.z);
         let phi_i = wi.y.atan2(wi.x);
-        // phi_m - phi_i; zero for a half vector or wi along the normal, to rounding.
+        // This is phi_m - phi_i. It is set to zero where the half vector or wi equals the normal to rounding.
         let relative = if horizontal_i.min(horizontal_m) <= 1e-15 {
             0.0
         } else {
@@ -294,7 +296,7 @@ impl RglBrdf {
         } else {
             1.0
         };
-        // NaN, from directions that are none, becomes 0 too.
+        // A NaN, which comes from directions that hold one, becomes 0, too.
         self.colour(low, high, weight, s_x, s_y).map(|value| (value * factor).max(0.0))
     }
 
@@ -317,11 +319,10 @@ impl RglBrdf {
 }
 
 impl Brdf for RglBrdf {
-    /// `f(wi, wo)`. As measured, it obeys reciprocity up to noise only; wrap it in
-    /// [`Reciprocal`](crate::Reciprocal) where that matters. Finite for all directions; `cos(theta_o)` under
-    /// 1e-6 counts as 1e-6.
+    /// `f(wi, wo)`. As measured, it obeys reciprocity only up to noise; wrap it in [`Reciprocal`] where that
+    /// matters. It is finite for all directions; a `cos(theta_o)` below 1e-6 is replaced by 1e-6.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
-        // Written so that NaN gives zero.
+        // This condition is also true for NaN, for which the result is zero.
         if !(wi.z > 0.0 && wo.z > 0.0) {
             return [0.0; 3];
         }
@@ -339,7 +340,7 @@ impl std::fmt::Debug for RglBrdf {
     }
 }
 
-/// Reads an RGL `.bsdf` file: isotropic, RGB.
+/// Reads an RGL `.bsdf` file with an isotropic RGB measurement.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) when the file cannot be read; [`Error::Format`](crate::Error::Format) when
@@ -357,7 +358,7 @@ mod tests {
     use crate::formats::rgl::tensor_file::F32;
     use crate::test_data::data_dir;
 
-    /// A small file: constant maps, so that `f` is known.
+    /// A small file with constant maps, so that `f` is known.
     struct Maker {
         fields: Vec<(&'static str, u8, Vec<u64>, Vec<u8>)>,
     }
@@ -446,7 +447,7 @@ mod tests {
         assert_eq!(plain.eval(&Vector3::z(), &Vector3::z()), [0.5, 1.0, 0.0]);
     }
 
-    /// A warp taken forwards, by bisection on the integrals of the blended density, undoes `invert`.
+    /// A forward warp, found by bisection on the integrals of the blended density, undoes `invert`.
     #[test]
     fn warp_is_the_cumulative_distribution() {
         let mut random = Random::new(11);
@@ -471,7 +472,7 @@ mod tests {
             let row = |j: usize| mix(normalised[j * width + i], normalised[j * width + i + 1], a);
             mix(row(j), row(j + 1), b)
         };
-        // The midpoint rule in cells of a fine grid.
+        // The integral is taken by the midpoint rule in the cells of a fine grid.
         let steps = 3 * 400;
         let integral = |to: f64, f: &dyn Fn(f64) -> f64| -> f64 {
             let h = to / f64::from(steps);
@@ -540,7 +541,7 @@ mod tests {
             assert_eq!(brdf.eval(&below, &n), [0.0; 3]);
             assert_eq!(brdf.eval(&n, &below), [0.0; 3]);
         }
-        // Only the azimuth between the two counts.
+        // Only the azimuth between the two directions matters.
         let turned = (direction(0.5, 3.0), direction(1.1, 4.0));
         let base = brdf.eval(&direction(0.5, 0.0), &direction(1.1, 1.0));
         let found = brdf.eval(&turned.0, &turned.1);

@@ -1,9 +1,10 @@
 //! The container of RGL `.bsdf` files: named arrays.
 //!
 //! Little-endian: `"tensor_file\0"`, `u8` major 1, `u8` minor 0, `u32` number of fields; then for each field
-//! `u16` length of the name, the name, `u16` number of dimensions, `u8` type, `u64` offset from the start of the
-//! file, `u64` length of each dimension. Arrays are in C order. Source: the reader published with J. Dupuy and
-//! W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering" (2018).
+//! `u16` length of the name, the name, `u16` number of dimensions, `u8` type, `u64` offset from the start of
+//! the file, `u64` length of each dimension. Arrays are in C order. Source: the reader published with J.
+//! Dupuy and W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering"
+//! (2018).
 
 use std::path::Path;
 
@@ -29,7 +30,7 @@ const TYPES: [(&str, usize); 11] = [
     ("f64", 8),
 ];
 
-/// One array. Its bytes are known to lie within the file and to match its shape.
+/// One array. [`TensorFile::parse`] has checked that its bytes lie within the file and match its shape.
 #[derive(Clone, Debug)]
 pub(super) struct Field<'a> {
     name: &'a [u8],
@@ -45,7 +46,7 @@ pub(super) struct TensorFile<'a> {
     path: &'a Path,
 }
 
-/// Reads numbers off the front of the file.
+/// Reads numbers from the front of the file.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -64,8 +65,8 @@ impl<'a> Cursor<'a> {
 }
 
 impl<'a> TensorFile<'a> {
-    /// Parses the header and checks every array's place against the length of the file. Allocates in
-    /// proportion to the file's header, whatever it claims.
+    /// Parses the header and checks the place of every array against the length of the file. Allocates memory
+    /// in proportion to the real length of the header, whatever sizes it claims.
     pub(super) fn parse(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
         let file = Self { fields: Vec::new(), path };
         if bytes.is_empty() {
@@ -109,7 +110,7 @@ impl<'a> TensorFile<'a> {
                     format!("shape {lengths:?} of {size}-byte elements at offset {offset}"),
                 )
             })?;
-            // A length fits usize, or another one is 0.
+            // A length fits usize, unless another one is 0.
             let shape = lengths.iter().map(|&length| usize::try_from(length).unwrap_or(usize::MAX)).collect();
             fields.push(Field { name, dtype, shape, bytes: payload });
         }
@@ -121,7 +122,7 @@ impl<'a> TensorFile<'a> {
         self.fields.iter().find(|field| field.name == name.as_bytes())
     }
 
-    /// The field called `name`, of type `dtype` and with `dimensions` dimensions.
+    /// The field called `name`; an error unless it has type `dtype` and `dimensions` dimensions.
     pub(super) fn field(&self, name: &str, dtype: u8, dimensions: usize) -> Result<&Field<'a>> {
         let Some(field) = self.get(name) else {
             let names: Vec<_> = self.fields.iter().map(|f| f.name.escape_ascii().to_string()).collect();
@@ -137,7 +138,7 @@ impl<'a> TensorFile<'a> {
         Ok(field)
     }
 
-    /// The `f32` field called `name`: its shape and its values, all finite.
+    /// Shape and values of the `f32` field called `name`; an error unless all values are finite.
     pub(super) fn floats(&self, name: &str, dimensions: usize) -> Result<(Vec<usize>, Vec<f32>)> {
         let field = self.field(name, F32, dimensions)?;
         let values: Vec<f32> =

@@ -3,10 +3,9 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use faer::Mat;
-
-use super::factor::{INVERSE_COLUMNS, factorize};
+use super::factor::INVERSE_COLUMNS;
 use crate::base::error::{Error, Result};
+use crate::base::linalg::factorize;
 
 /// Forecast of a dense run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,11 +26,24 @@ pub struct DenseCost {
 pub fn dense_cost(samples: usize, channels: usize, gradient_evaluations: usize) -> DenseCost {
     let n = samples as f64;
     let evaluations = gradient_evaluations as f64;
-    let strips = (rayon::current_num_threads() * INVERSE_COLUMNS) as f64;
     let cubic = n.powi(3) * (1.0 / 6.0 + 0.5 * evaluations) / multiply_adds_per_second();
     // Assembly, contraction and solves: a few hundred instructions a pair.
     let square = n * n * (20e-9 + 1e-9 * channels as f64) * (1.0 + evaluations);
-    DenseCost { samples, bytes: 8.0 * n * (n + strips), seconds: cubic + square }
+    DenseCost { samples, bytes: bytes(samples), seconds: cubic + square }
+}
+
+/// Memory of one fit to `samples` samples.
+fn bytes(samples: usize) -> f64 {
+    let n = samples as f64;
+    8.0 * n * (n + (rayon::current_num_threads() * INVERSE_COLUMNS) as f64)
+}
+
+/// Refuses what needs more memory than is available, as [`DenseCost::check`] does, but measures the speed only then.
+pub(super) fn check_memory(samples: usize, channels: usize, gradient_evaluations: usize) -> Result<()> {
+    if bytes(samples) <= available_bytes() {
+        return Ok(());
+    }
+    dense_cost(samples, channels, gradient_evaluations).check()
 }
 
 impl DenseCost {
@@ -76,11 +88,12 @@ fn multiply_adds_per_second() -> f64 {
     static SPEED: OnceLock<f64> = OnceLock::new();
     *SPEED.get_or_init(|| {
         const N: usize = 1024;
-        let matrix = Mat::<f64>::from_fn(N, N, |i, j| if i == j { 2.0 } else { 1.0 / (N as f64) });
+        let entry = |at: usize| if at.is_multiple_of(N + 1) { 2.0 } else { 1.0 / (N as f64) };
+        let matrix: Vec<f64> = (0..N * N).map(entry).collect();
         let time = |_| {
             let mut work = matrix.clone();
             let start = Instant::now();
-            factorize(work.as_mut());
+            factorize(&mut work, N);
             start.elapsed().as_secs_f64()
         };
         let seconds = (0..3).map(time).fold(f64::INFINITY, f64::min);

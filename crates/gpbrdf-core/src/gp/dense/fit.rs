@@ -3,7 +3,8 @@
 use crate::base::error::{Error, Result};
 use crate::base::random::golden_ratio_subset;
 use crate::gp::dense::{DenseEvaluator, DenseGp};
-use crate::gp::report::{FitReport, MIN_NOISE_RATIO, Noise};
+use crate::gp::hyper::MIN_NOISE_RATIO;
+use crate::gp::report::{FitReport, Noise};
 use crate::gp::{OptimizeOptions, Optimum, Parameter, maximize};
 use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
 

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::*;
-use crate::kernel::{Shape, test_kernels};
+use crate::kernel::Shape;
 use crate::test_data::data_dir;
 
 fn close(a: f64, b: f64, tolerance: f64) -> bool {
@@ -21,6 +21,7 @@ fn samples(n: usize, channels: usize) -> (Vec<f64>, Vec<f64>) {
 fn numbers(value: &Value) -> Vec<f64> {
     match value.as_array() {
         Some(rows) => rows.iter().flat_map(numbers).collect(),
+        None if value.is_null() => Vec::new(),
         None => vec![value.as_f64().unwrap()],
     }
 }
@@ -33,7 +34,7 @@ fn reference_cases_of_scikit_learn() {
     let (x, y, x_test) =
         (numbers(&reference["x_train"]), numbers(&reference["y_train"]), numbers(&reference["x_test"]));
     let length_scale = [0.6, 0.9, 1.7];
-    let mut checked = 0;
+    let mut with_gradient = 0;
     for case in reference["cases"].as_array().unwrap() {
         let name = case["kernel"].as_str().unwrap();
         let shape = match name {
@@ -69,19 +70,20 @@ fn reference_cases_of_scikit_learn() {
                 assert!(close(*a, *b, tolerance), "{name} {key}: {a} {b}");
             }
         }
-        let mut evaluator = DenseEvaluator::new(&x, 3, &y, 1).unwrap();
-        let likelihood = evaluator.evaluate_with_gradient(&kernel, 0.02).unwrap();
-        assert!(close(likelihood.log_marginal_likelihood, lml, tolerance), "{name}");
-        if !case["gradient_theta_log"].is_null() {
-            let theirs = numbers(&case["gradient_theta_log"]);
-            assert_eq!(likelihood.gradient.len(), theirs.len());
-            for (a, b) in likelihood.gradient.iter().zip(&theirs) {
+        let gradient = numbers(&case["gradient_theta_log"]);
+        with_gradient += usize::from(!gradient.is_empty());
+        #[cfg(feature = "fit")]
+        {
+            let mut evaluator = DenseEvaluator::new(&x, 3, &y, 1).unwrap();
+            let likelihood = evaluator.evaluate_with_gradient(&kernel, 0.02).unwrap();
+            assert!(close(likelihood.log_marginal_likelihood, lml, tolerance), "{name}");
+            assert!(gradient.is_empty() || likelihood.gradient.len() == gradient.len());
+            for (a, b) in likelihood.gradient.iter().zip(&gradient) {
                 assert!(close(*a, *b, tolerance), "{name} gradient: {a} {b}");
             }
-            checked += 1;
         }
     }
-    assert_eq!(checked, 4);
+    assert_eq!(with_gradient, 4);
 }
 
 #[test]
@@ -110,11 +112,12 @@ fn posterior_of_one_and_two_points_by_hand() {
     assert!(close(gp.log_marginal_likelihood().unwrap(), lml, 1e-14));
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn gradients_match_central_differences_for_every_kernel() {
     let (x, y) = samples(40, 2);
     let mut evaluator = DenseEvaluator::new(&x, 3, &y, 2).unwrap();
-    for kernel in test_kernels() {
+    for kernel in crate::kernel::test_kernels() {
         let noise: f64 = 0.03;
         let likelihood = evaluator.evaluate_with_gradient(&kernel, noise).unwrap();
         assert_eq!(likelihood, evaluator.evaluate_with_gradient(&kernel, noise).unwrap());
@@ -140,6 +143,7 @@ fn gradients_match_central_differences_for_every_kernel() {
     }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn leaving_one_out_matches_refits() {
     let (x, y) = samples(17, 2);
@@ -174,11 +178,16 @@ fn duplicated_points_without_noise_climb_the_jitter_ladder() {
     assert!(gp.jitter() >= 4e-12 && gp.jitter() <= 4e-6, "{}", gp.jitter());
     let mean = gp.predict_mean(&x).unwrap();
     assert!(mean.iter().zip(&y).all(|(m, y)| (m - y).abs() < 1e-2));
-    let mut evaluator = DenseEvaluator::new(&x, 3, &y, 1).unwrap();
-    assert_eq!(evaluator.evaluate(&kernel, 0.0).unwrap().jitter, gp.jitter());
-    assert_eq!(evaluator.evaluate(&kernel, 0.1).unwrap().jitter, 0.0);
+    assert_eq!(DenseGp::fit_at(&x, &y, 1, kernel.clone(), 0.1).unwrap().jitter(), 0.0);
+    #[cfg(feature = "fit")]
+    {
+        let mut evaluator = DenseEvaluator::new(&x, 3, &y, 1).unwrap();
+        assert_eq!(evaluator.evaluate(&kernel, 0.0).unwrap().jitter, gp.jitter());
+        assert_eq!(evaluator.evaluate(&kernel, 0.1).unwrap().jitter, 0.0);
+    }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn blocks_of_the_inverse_match_the_identity() {
     // Three blocks, the last one narrower.
@@ -194,7 +203,7 @@ fn blocks_of_the_inverse_match_the_identity() {
     let mut inverse = vec![vec![0.0; n]; n];
     for (first, width) in [(0, block), (block, block), (2 * block, 44)] {
         let mut columns = vec![0.0; (n - first) * width];
-        factor::inverse_columns(gp.factor().unwrap(), n, first, width, &mut columns);
+        inverse::inverse_columns(gp.factor().unwrap(), n, first, width, &mut columns);
         for (column, j) in columns.chunks(n - first).zip(first..) {
             for i in j..n {
                 inverse[i][j] = column[i - first];
@@ -208,6 +217,7 @@ fn blocks_of_the_inverse_match_the_identity() {
     }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let (x, y) = samples(700, 3);
@@ -254,9 +264,12 @@ fn what_cannot_be_fitted_is_refused() {
     // 8e12 samples squared: 73 TiB.
     let many = vec![0.5; 3_000_000];
     assert!(matches!(fit(&many, &many, 1, 0.1), Err(Error::TooLarge { samples: 3_000_000, .. })));
-    assert!(matches!(DenseEvaluator::new(&many, 1, &many, 1), Err(Error::TooLarge { .. })));
     let two = Kernel::ard(1.0, Shape::Matern52, &[0.5, 0.5]);
-    assert!(DenseEvaluator::new(&[0.0], 1, &[1.0], 1).unwrap().evaluate(&two, 0.1).is_err());
+    #[cfg(feature = "fit")]
+    {
+        assert!(matches!(DenseEvaluator::new(&many, 1, &many, 1), Err(Error::TooLarge { .. })));
+        assert!(DenseEvaluator::new(&[0.0], 1, &[1.0], 1).unwrap().evaluate(&two, 0.1).is_err());
+    }
     let gp = DenseGp::fit_at(&[0.0, 1.0], &[1.0], 1, two, 0.1).unwrap();
     assert!(gp.predict_mean(&[0.0]).is_err() && gp.predict_variance_latent(&[f64::NAN, 0.0]).is_err());
     assert!(gp.predict_mean(&[]).unwrap().is_empty());

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 
 use super::heavy_tails::heavy_tailed_weights;
 use super::regression::{CardinalAxis, Regression, regress};
-use super::{COLOUR_CONSTANTS, COMPONENT_CONSTANTS, InducingShape, PRIOR_MEANS, check_shape};
+use super::{COLOUR_CONSTANTS, COMPONENT_CONSTANTS, InducingShape, check_shape};
 use crate::base::error::{Error, Result};
+use crate::base::linalg::view;
 use crate::kernel::{Kernel1d, Shape};
 use crate::sample::lattice::PHI_DENSITY;
 use crate::sample::space::WarpedBox;
@@ -240,7 +241,11 @@ fn cardinal_on(lattice: &InducingShape, data: &GridData) -> Result<[CardinalAxis
     let u: Vec<f64> = data.u.iter().map(|&u| lattice.space.warp_u(u)).collect();
     let v: Vec<f64> = data.v.iter().map(|&v| lattice.space.warp_v(v)).collect();
     let phi: Vec<f64> = data.phi.iter().map(|&phi| lattice.space.warp_phi(phi)).collect();
-    lattice.cardinal([&u, &v, &phi])
+    let (points, nodes) = ([u, v, phi], lattice.nodes());
+    let (metrics, mirrored) = (lattice.space.lattice_metrics(), lattice.space.mirrored());
+    let axis =
+        |k: usize| CardinalAxis::new(&lattice.kernels[k], metrics[k], mirrored[k], &points[k], &nodes[k]);
+    Ok([axis(0)?, axis(1)?, axis(2)?])
 }
 
 /// Adds the squared residuals of one component's values to those of the others. As colours are mixed by an orthogonal matrix,
@@ -268,6 +273,9 @@ pub(crate) enum Budget {
     /// So many numbers in all, constants included.
     Floats(usize),
 }
+
+/// Stored with a model whatever its solver: the prior means.
+const PRIOR_MEANS: usize = 3;
 
 /// The smallest number of floats: three lattices of the smallest shape.
 pub(crate) const SMALLEST_FLOATS: usize =
@@ -463,8 +471,8 @@ fn finish(
     add_squares(&lattice, &values, data, component, &mut squares)?;
     // Outliers count in the noise as much as the others.
     let residual = (squares.iter().zip(&data.weights).map(|(r, w)| r * w).sum::<f64>() / n).max(1e-12);
-    let axes = lattice.cardinal([&[], &[], &[]])?;
-    let solved = crate::gp::contract(axes.each_ref().map(|axis| axis.inverse.as_ref()), &values, 1);
+    let inverses = lattice.inverses()?;
+    let solved = crate::gp::contract(inverses.each_ref().map(view), &values, 1);
     let energy: f64 = solved.iter().zip(&values).map(|(a, b)| a * b).sum();
     let unexplained = ((prior_trace(&lattice, data, weights) - explained) / n).max(1e-15);
     let likely = (energy / values.len() as f64).max(1e-12);
@@ -512,7 +520,7 @@ fn bound(lattice: &InducingShape, data: &GridData, weights: &[f64], component: u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gp::inducing::regression::axis_kernel;
+    use crate::gp::inducing::node_covariance::axis_kernel;
     use nalgebra::{DMatrix, DVector};
 
     /// A smooth function of the box on a small grid.

@@ -5,18 +5,24 @@
 //! `s^2 (k(x, x) - k(x, Z) K_ZZ^-1 k(Z, x))`. The variance leaves out what is not known about the values themselves;
 //! with thousands of cells to a node that is far below what lies between the nodes.
 
+#[cfg(feature = "fit")]
 pub(crate) mod cell_grid;
+#[cfg(feature = "fit")]
 pub(crate) mod fit;
+#[cfg(feature = "fit")]
 mod heavy_tails;
+mod node_covariance;
 pub(crate) mod posterior;
+#[cfg(feature = "fit")]
 mod regression;
 
 use serde::{Deserialize, Serialize};
 
-use self::regression::CardinalAxis;
+use self::node_covariance::NodeCovariance;
 use crate::base::error::{Error, Result};
+use crate::base::linalg::{Matrix, view};
+use crate::gp::hyper::MIN_NOISE_RATIO;
 use crate::gp::lattice::{LatticeData, LatticeGp, LatticeHyper};
-use crate::gp::report::MIN_NOISE_RATIO;
 use crate::kernel::Kernel1d;
 use crate::sample::space::WarpedBox;
 
@@ -67,15 +73,13 @@ impl InducingShape {
         self.len() == 0
     }
 
-    /// Cardinal functions of the three axes at points given by their kernel coordinates.
-    ///
-    /// # Errors
-    /// Nodes too close for their kernel.
-    pub(crate) fn cardinal(&self, points: [&[f64]; 3]) -> Result<[CardinalAxis; 3]> {
+    /// The inverse covariance of the nodes of each axis.
+    pub(super) fn inverses(&self) -> Result<[Matrix; 3]> {
         let nodes = self.nodes();
         let (metrics, mirrored) = (self.space.lattice_metrics(), self.space.mirrored());
-        let axis =
-            |k: usize| CardinalAxis::new(&self.kernels[k], metrics[k], mirrored[k], points[k], &nodes[k]);
+        let axis = |k: usize| -> Result<Matrix> {
+            Ok(NodeCovariance::new(&self.kernels[k], metrics[k], mirrored[k], &nodes[k])?.inverse())
+        };
         Ok([axis(0)?, axis(1)?, axis(2)?])
     }
 
@@ -135,9 +139,8 @@ impl InducingComponent {
             return Err(Error::argument("noise variance", "a positive number", lattice.noise_variance));
         }
         hyper.validate()?;
-        let axes = lattice.cardinal([&[], &[], &[]])?;
-        let weights =
-            crate::gp::contract(axes.each_ref().map(|axis| axis.inverse.as_ref()), &data.targets, 1);
+        let inverses = lattice.inverses()?;
+        let weights = crate::gp::contract(inverses.each_ref().map(view), &data.targets, 1);
         Ok(Self { gp: LatticeGp::from_weights(data, hyper, weights)?, lattice })
     }
 
@@ -172,9 +175,6 @@ pub(crate) const COMPONENT_CONSTANTS: usize = 8;
 
 /// Stored with all components: the colour matrix.
 pub(crate) const COLOUR_CONSTANTS: usize = 9;
-
-/// Stored with a model whatever its solver: the prior means.
-pub(crate) const PRIOR_MEANS: usize = 3;
 
 /// The inducing lattices of a material: `target_c = offset_c + sum_k mix_ck component_k`.
 #[derive(Clone, Debug)]

@@ -12,25 +12,9 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
-use crate::gp::dense::factor::{factorize, half_log_det, solve};
+use crate::base::linalg::{factorize, half_log_det, solve};
+use crate::gp::inducing::node_covariance::{NodeCovariance, axis_kernel};
 use crate::kernel::{AxisMetric, Kernel1d};
-
-/// Added to the variance of every node, relative, against rounding in smooth kernels.
-const NODE_JITTER: f64 = 1e-9;
-
-/// Kernel values `[x][z]` of one axis; a mirrored axis has the kernel `k(x, z) + k(x, -z)`.
-pub(crate) fn axis_kernel(
-    kernel: &Kernel1d,
-    metric: AxisMetric,
-    mirrored: bool,
-    x: &[f64],
-    z: &[f64],
-) -> Mat<f64> {
-    Mat::from_fn(x.len(), z.len(), |i, j| {
-        let image = if mirrored { kernel.value(metric.distance(x[i], -z[j])) } else { 0.0 };
-        kernel.value(metric.distance(x[i], z[j])) + image
-    })
-}
 
 /// The cardinal functions of one axis at the grid's points, and the covariance of its nodes.
 #[derive(Clone, Debug)]
@@ -56,22 +40,11 @@ impl CardinalAxis {
         x: &[f64],
         z: &[f64],
     ) -> Result<Self> {
-        let n = z.len();
-        let mut covariance = axis_kernel(kernel, metric, mirrored, z, z);
-        let jitter = NODE_JITTER * (0..n).map(|i| covariance[(i, i)]).sum::<f64>() / n as f64;
-        (0..n).for_each(|i| covariance[(i, i)] += jitter);
-        let mut factor = covariance.clone();
-        if !factorize(factor.as_mut()) {
-            return Err(Error::NotPositiveDefinite { size: n, largest_jitter: NODE_JITTER });
-        }
-        let packed: Vec<f64> =
-            factor.col_iter().flat_map(|c| c.iter().copied().collect::<Vec<_>>()).collect();
-        let mut inverse = vec![0.0; n * n];
-        inverse.iter_mut().step_by(n + 1).for_each(|x| *x = 1.0);
-        solve(&packed, n, &mut inverse);
-        let inverse = MatRef::from_column_major_slice(&inverse, n, n).to_owned();
+        let nodes = NodeCovariance::new(kernel, metric, mirrored, z)?;
+        let inverse = nodes.inverse();
         let functions = axis_kernel(kernel, metric, mirrored, x, z) * &inverse;
-        Ok(Self { functions, covariance, inverse, half_log_det: half_log_det(&packed, n) })
+        let half_log_det = half_log_det(&nodes.factor, z.len());
+        Ok(Self { functions, covariance: nodes.matrix, inverse, half_log_det })
     }
 
     fn nodes(&self) -> usize {
@@ -137,7 +110,7 @@ pub(crate) fn regress(
     let diagonal: f64 = matrix.iter().step_by(m + 1).sum::<f64>() / m as f64;
     // Nodes where no data are leave rounding only: a jitter far below anything that was measured.
     matrix.iter_mut().step_by(m + 1).for_each(|x| *x += 1e-13 * diagonal);
-    if !factorize(MatMut::from_column_major_slice_mut(&mut matrix, m, m)) {
+    if !factorize(&mut matrix, m) {
         return Err(Error::NotPositiveDefinite { size: m, largest_jitter: 1e-13 });
     }
     let mut values = rhs.clone();

@@ -1,10 +1,7 @@
 //! Samples on a product lattice, and the covariances of its axes.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::evd::{ComputeEigenvectors, self_adjoint_evd, self_adjoint_evd_scratch};
-use faer::{Mat, Par};
-
 use crate::base::error::{Error, Result};
+use crate::base::linalg::{Matrix, symmetric_eigen};
 use crate::kernel::{AxisMetric, Kernel1d};
 
 /// Coordinates and targets on a lattice: what a lattice process is fitted to.
@@ -59,23 +56,6 @@ impl LatticeData {
         Ok(())
     }
 
-    /// Every second node along each axis: an eighth of the work for a first guess at the hyper-parameters.
-    #[must_use]
-    pub(crate) fn decimated(&self) -> Self {
-        let [_, b, c] = self.shape();
-        let coordinates =
-            self.coordinates.each_ref().map(|x| x.iter().copied().step_by(2).collect::<Vec<_>>());
-        let mut targets = Vec::with_capacity(self.targets.len() / 8 + 1);
-        for tensor in self.targets.chunks(self.len()) {
-            for plane in tensor.chunks(b * c).step_by(2) {
-                for row in plane.chunks(c).step_by(2) {
-                    targets.extend(row.iter().step_by(2));
-                }
-            }
-        }
-        Self { coordinates, metrics: self.metrics, mirrored: self.mirrored, targets, channels: self.channels }
-    }
-
     /// The mirror image of a coordinate of axis `k`, where there is one.
     pub(super) fn image(&self, k: usize, x: f64) -> Option<f64> {
         self.mirrored[k].then_some(-x)
@@ -88,12 +68,12 @@ impl LatticeData {
     }
 
     /// The covariance of axis `k` and its derivatives in the kernel's log-parameters.
-    pub(super) fn gram(&self, k: usize, kernel: &Kernel1d, derivatives: bool) -> (Mat<f64>, Vec<Mat<f64>>) {
+    pub(super) fn gram(&self, k: usize, kernel: &Kernel1d, derivatives: bool) -> (Matrix, Vec<Matrix>) {
         let (x, metric) = (&self.coordinates[k], self.metrics[k]);
         let n = x.len();
         let count = if derivatives { kernel.n_parameters() } else { 0 };
-        let mut gram = Mat::zeros(n, n);
-        let mut slopes = vec![Mat::zeros(n, n); count];
+        let mut gram = Matrix::zeros(n, n);
+        let mut slopes = vec![Matrix::zeros(n, n); count];
         let mut row = vec![0.0; count];
         for j in 0..n {
             for i in j..n {
@@ -137,31 +117,20 @@ impl LatticeData {
 /// Eigendecomposition of one axis's covariance.
 #[derive(Clone, Debug)]
 pub(crate) struct AxisEigen {
-    pub(crate) vectors: Mat<f64>,
+    pub(crate) vectors: Matrix,
     pub(crate) values: Vec<f64>,
 }
 
 /// For each axis the derivatives of its covariance in the log-parameters of its kernel.
-pub(super) type AxisSlopes = [Vec<Mat<f64>>; 3];
+pub(super) type AxisSlopes = [Vec<Matrix>; 3];
 
 impl AxisEigen {
-    pub(super) fn new(gram: &Mat<f64>) -> Result<Self> {
-        let n = gram.nrows();
-        let mut vectors = Mat::zeros(n, n);
-        let mut values = faer::diag::Diag::zeros(n);
-        let scratch =
-            self_adjoint_evd_scratch::<f64>(n, ComputeEigenvectors::Yes, Par::Seq, Default::default());
-        self_adjoint_evd(
-            gram.as_ref(),
-            values.as_mut(),
-            Some(vectors.as_mut()),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(scratch)),
-            Default::default(),
-        )
-        .map_err(|_| Error::argument("covariance of an axis", "finite entries", "no eigendecomposition"))?;
+    pub(super) fn new(gram: &Matrix) -> Result<Self> {
+        let (mut values, vectors) = symmetric_eigen(gram).ok_or_else(|| {
+            Error::argument("covariance of an axis", "finite entries", "no eigendecomposition")
+        })?;
         // Rounding leaves the smallest eigenvalues of smooth kernels slightly negative.
-        let values = values.column_vector().iter().map(|x| x.max(0.0)).collect();
+        values.iter_mut().for_each(|x| *x = x.max(0.0));
         Ok(Self { vectors, values })
     }
 }

@@ -1,15 +1,15 @@
 //! Contractions of third-order tensors with one small matrix per axis.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
+
+use crate::base::linalg::{Matrix, View, product_into, product_into_slice, view, view_slice};
 
 /// Applies `M_u (x) M_v (x) M_phi` to each of `channels` tensors.
 ///
 /// `x` is `[channel][A][B][C]`, last index fastest, with `M_u` of shape `A' x A` and so on; the result is
 /// `[channel][A'][B'][C']`. Costs `A B C C' + A B B' C' + A A' B' C'` multiply-adds a channel. Every output
 /// element is summed in one fixed order, so the result does not depend on the number of threads.
-pub(crate) fn apply(matrices: [MatRef<'_, f64>; 3], x: &[f64], channels: usize) -> Vec<f64> {
+pub(crate) fn apply(matrices: [View<'_>; 3], x: &[f64], channels: usize) -> Vec<f64> {
     let [m_u, m_v, m_phi] = matrices;
     let [a_in, b_in, c_in] = matrices.map(|m| m.ncols());
     let [a_out, b_out, c_out] = matrices.map(|m| m.nrows());
@@ -17,13 +17,11 @@ pub(crate) fn apply(matrices: [MatRef<'_, f64>; 3], x: &[f64], channels: usize) 
     // Slabs of constant (channel, a): phi first, then v.
     let mut half = vec![0.0; channels * a_in * b_out * c_out];
     half.par_chunks_mut(b_out * c_out).zip(x.par_chunks(b_in * c_in)).for_each_init(
-        || Mat::<f64>::zeros(c_in, b_out),
+        || Matrix::zeros(c_in, b_out),
         |scratch, (out, slab)| {
             // A row-major B x C slab is a column-major C x B matrix.
-            let slab = MatRef::from_column_major_slice(slab, c_in, b_in);
-            matmul(scratch.as_mut(), Accum::Replace, slab, m_v.transpose(), 1.0, Par::Seq);
-            let out = MatMut::from_column_major_slice_mut(out, c_out, b_out);
-            matmul(out, Accum::Replace, m_phi, scratch.as_ref(), 1.0, Par::Seq);
+            product_into(scratch, view_slice(slab, c_in, b_in), m_v.transpose());
+            product_into_slice(out, m_phi, view(scratch));
         },
     );
     // Then u: one (B' C') x A matrix a channel, a few output columns a task.
@@ -31,67 +29,14 @@ pub(crate) fn apply(matrices: [MatRef<'_, f64>; 3], x: &[f64], channels: usize) 
     let group = a_out.div_ceil(4).max(1);
     let mut out = vec![0.0; channels * a_out * plane];
     out.par_chunks_mut(a_out * plane).zip(half.par_chunks(a_in * plane)).for_each(|(out, half)| {
-        let half = MatRef::from_column_major_slice(half, plane, a_in);
+        let half = view_slice(half, plane, a_in);
         out.par_chunks_mut(group * plane).enumerate().for_each(|(i, out)| {
             let columns = out.len() / plane;
             let rows = m_u.subrows(i * group, columns);
-            let out = MatMut::from_column_major_slice_mut(out, plane, columns);
-            matmul(out, Accum::Replace, half, rows.transpose(), 1.0, Par::Seq);
+            product_into_slice(out, half, rows.transpose());
         });
     });
     out
-}
-
-/// For each axis the matrix of inner products of a tensor's slices, weighted along the other two axes:
-/// `G_u[a, a'] = sum_bc w_v[b] w_phi[c] x[a, b, c] x[a', b, c]` and likewise for `v` and `phi`, summed over
-/// channels. `roots` holds the square roots of the weights of each axis.
-pub(crate) fn weighted_grams(roots: [&[f64]; 3], x: &[f64], channels: usize) -> [Mat<f64>; 3] {
-    let [a, b, c] = roots.map(<[f64]>::len);
-    let mut tasks: Vec<(usize, &[f64])> = Vec::with_capacity(3 * channels);
-    for axis in 0..3 {
-        tasks.extend(x.chunks(a * b * c).map(|tensor| (axis, tensor)));
-    }
-    let partial: Vec<Mat<f64>> = tasks
-        .into_par_iter()
-        .map(|(axis, tensor)| {
-            let size = [a, b, c][axis];
-            let mut gram = Mat::zeros(size, size);
-            let mut scaled = tensor.to_vec();
-            for (i, plane) in scaled.chunks_mut(b * c).enumerate() {
-                let s_u = if axis == 0 { 1.0 } else { roots[0][i] };
-                for (j, row) in plane.chunks_mut(c).enumerate() {
-                    let s_uv = if axis == 1 { s_u } else { s_u * roots[1][j] };
-                    if axis == 2 {
-                        row.iter_mut().for_each(|x| *x *= s_uv);
-                    } else {
-                        row.iter_mut().zip(roots[2]).for_each(|(x, s_phi)| *x *= s_uv * s_phi);
-                    }
-                }
-            }
-            match axis {
-                0 => {
-                    let m = MatRef::from_column_major_slice(&scaled, b * c, a);
-                    matmul(gram.as_mut(), Accum::Replace, m.transpose(), m, 1.0, Par::Seq);
-                }
-                1 => {
-                    for plane in scaled.chunks(b * c) {
-                        let m = MatRef::from_column_major_slice(plane, c, b);
-                        matmul(gram.as_mut(), Accum::Add, m.transpose(), m, 1.0, Par::Seq);
-                    }
-                }
-                _ => {
-                    let m = MatRef::from_column_major_slice(&scaled, c, a * b);
-                    matmul(gram.as_mut(), Accum::Replace, m, m.transpose(), 1.0, Par::Seq);
-                }
-            }
-            gram
-        })
-        .collect();
-    let mut sums = [Mat::zeros(a, a), Mat::zeros(b, b), Mat::zeros(c, c)];
-    for (i, gram) in partial.into_iter().enumerate() {
-        sums[i / channels] += gram;
-    }
-    sums
 }
 
 #[cfg(test)]
@@ -99,19 +44,19 @@ mod tests {
     use super::*;
     use crate::base::random::SplitMix64;
 
-    fn random(rows: usize, columns: usize, random: &mut SplitMix64) -> Mat<f64> {
-        Mat::from_fn(rows, columns, |_, _| random.next_unit() - 0.5)
+    fn random(rows: usize, columns: usize, random: &mut SplitMix64) -> Matrix {
+        Matrix::from_fn(rows, columns, |_, _| random.next_unit() - 0.5)
     }
 
     #[test]
-    fn apply_and_grams_agree_with_the_sums_written_out() {
+    fn apply_agrees_with_the_sums_written_out() {
         let mut seed = SplitMix64::new(1);
         let (shape_in, shape_out, channels) = ([4, 3, 5], [6, 2, 3], 2);
-        let matrices: [Mat<f64>; 3] = std::array::from_fn(|k| random(shape_out[k], shape_in[k], &mut seed));
+        let matrices: [Matrix; 3] = std::array::from_fn(|k| random(shape_out[k], shape_in[k], &mut seed));
         let [a, b, c] = shape_in;
         let x: Vec<f64> = (0..channels * a * b * c).map(|_| seed.next_unit() - 0.5).collect();
         let at = |ch: usize, i: usize, j: usize, k: usize| x[((ch * a + i) * b + j) * c + k];
-        let found = apply([matrices[0].as_ref(), matrices[1].as_ref(), matrices[2].as_ref()], &x, channels);
+        let found = apply(matrices.each_ref().map(view), &x, channels);
         for ch in 0..channels {
             for (p, q, r) in itertools(shape_out) {
                 let mut sum = 0.0;
@@ -121,26 +66,6 @@ mod tests {
                 let value = found[((ch * shape_out[0] + p) * shape_out[1] + q) * shape_out[2] + r];
                 assert!((value - sum).abs() < 1e-14);
             }
-        }
-        let weights: [Vec<f64>; 3] = shape_in.map(|n| (0..n).map(|_| seed.next_unit()).collect());
-        let roots = weights.clone().map(|w| w.iter().map(|w| w.sqrt()).collect::<Vec<_>>());
-        let grams = weighted_grams([&roots[0], &roots[1], &roots[2]], &x, channels);
-        let mut expected = shape_in.map(|n| Mat::<f64>::zeros(n, n));
-        for ch in 0..channels {
-            for (i, j, k) in itertools(shape_in) {
-                for m in 0..a {
-                    expected[0][(i, m)] += weights[1][j] * weights[2][k] * at(ch, i, j, k) * at(ch, m, j, k);
-                }
-                for m in 0..b {
-                    expected[1][(j, m)] += weights[0][i] * weights[2][k] * at(ch, i, j, k) * at(ch, i, m, k);
-                }
-                for m in 0..c {
-                    expected[2][(k, m)] += weights[0][i] * weights[1][j] * at(ch, i, j, k) * at(ch, i, j, m);
-                }
-            }
-        }
-        for (found, expected) in grams.iter().zip(&expected) {
-            assert!((found - expected).norm_max() < 1e-13);
         }
     }
 

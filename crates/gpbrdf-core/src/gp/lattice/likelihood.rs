@@ -3,7 +3,8 @@
 use faer::MatRef;
 
 use super::data::{AxisEigen, AxisSlopes, LatticeData};
-use super::kronecker::{apply, weighted_grams};
+use super::grams::weighted_grams;
+use super::kronecker::apply;
 use super::{LatticeHyper, precision};
 use crate::base::error::Result;
 use crate::kernel::Kernel1d;

@@ -7,26 +7,33 @@
 //! Process Models" (2011), chapter 5.
 
 mod data;
+#[cfg(feature = "fit")]
 pub(crate) mod fit;
+#[cfg(feature = "fit")]
+mod grams;
 pub(crate) mod kronecker;
+#[cfg(feature = "fit")]
 mod likelihood;
 pub(crate) mod posterior;
 mod separable;
+#[cfg(feature = "fit")]
+pub(crate) mod solve;
 pub(crate) mod table;
 
 pub use data::LatticeData;
+#[cfg(feature = "fit")]
 pub use likelihood::LatticeLikelihood;
 pub use separable::{AxisBasis, SeparableForm};
 
 use std::sync::OnceLock;
 
-use faer::{Mat, MatRef, Par};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use self::data::AxisEigen;
 use self::kronecker::apply;
 use crate::base::error::{Error, Result};
+use crate::base::linalg::{Matrix, View, product, product_into, squared, view, view_slice};
 use crate::kernel::Kernel1d;
 
 /// Hyper-parameters of a lattice process.
@@ -88,8 +95,8 @@ impl LatticeGp {
         data.validate()?;
         hyper.validate()?;
         let spectrum = Spectrum::new(&data, &hyper)?;
-        let vectors = spectrum.eigen.each_ref().map(|e| e.vectors.as_ref());
-        let mut z = apply(vectors.map(MatRef::transpose), &data.targets, data.channels);
+        let vectors = spectrum.eigen.each_ref().map(|e| view(&e.vectors));
+        let mut z = apply(vectors.map(View::transpose), &data.targets, data.channels);
         for tensor in z.chunks_mut(spectrum.precision.len()) {
             tensor.iter_mut().zip(&spectrum.precision).for_each(|(z, d)| *z *= d);
         }
@@ -141,18 +148,18 @@ impl LatticeGp {
     /// Kernel values between `points` (coordinates along axis `k`) and the nodes: `points x nodes`, stored
     /// column by column.
     #[must_use]
-    pub(crate) fn cross(&self, k: usize, points: &[f64]) -> Mat<f64> {
-        let mut out = Mat::zeros(points.len(), self.data.coordinates[k].len());
+    pub(crate) fn cross(&self, k: usize, points: &[f64]) -> Matrix {
+        let mut out = Matrix::zeros(points.len(), self.data.coordinates[k].len());
         let (kernel, metric) = (&self.hyper.kernels[k], self.data.metrics[k]);
         let (mut sums, mut values) = (vec![0.0; points.len()], vec![0.0; points.len()]);
-        for (column, &node) in out.col_iter_mut().zip(&self.data.coordinates[k]) {
+        for (j, &node) in self.data.coordinates[k].iter().enumerate() {
             sums.fill(0.0);
             for other in std::iter::once(node).chain(self.data.image(k, node)) {
                 values.iter_mut().zip(points).for_each(|(d, &x)| *d = metric.distance(x, other).powi(2));
                 kernel.fill(&mut values);
                 sums.iter_mut().zip(&values).for_each(|(sum, value)| *sum += value);
             }
-            column.iter_mut().zip(&sums).for_each(|(out, sum)| *out = *sum);
+            sums.iter().enumerate().for_each(|(i, sum)| out[(i, j)] = *sum);
         }
         out
     }
@@ -169,18 +176,10 @@ impl LatticeGp {
                 let [ku, kv, kp] = self.cross_rows(points);
                 // All points and channels: contract u by one product.
                 let mut out = Vec::with_capacity(points.len() * channels);
-                let mut contracted = Mat::zeros(b * c, points.len());
+                let mut contracted = Matrix::zeros(b * c, points.len());
                 let mut sums = vec![0.0; points.len() * channels];
                 for (ch, weights) in self.weights.chunks(a * b * c).enumerate() {
-                    let weights = MatRef::from_column_major_slice(weights, b * c, a);
-                    faer::linalg::matmul::matmul(
-                        contracted.as_mut(),
-                        faer::Accum::Replace,
-                        weights,
-                        ku.transpose(),
-                        1.0,
-                        Par::Seq,
-                    );
+                    product_into(&mut contracted, view_slice(weights, b * c, a), view(&ku).transpose());
                     for p in 0..points.len() {
                         let mut sum = 0.0;
                         for j in 0..b {
@@ -210,13 +209,11 @@ impl LatticeGp {
         let spectrum = self.spectrum()?;
         let variances = points.par_chunks(64).flat_map_iter(|points| {
             let crosses = self.cross_rows(points);
-            let [mut su, mut sv, mut sp]: [Mat<f64>; 3] =
-                std::array::from_fn(|k| &crosses[k] * &spectrum.eigen[k].vectors);
-            for m in [&mut su, &mut sv, &mut sp] {
-                square(m);
-            }
-            let precision = MatRef::from_column_major_slice(&spectrum.precision, b * c, a);
-            let contracted = precision * su.transpose();
+            let [su, sv, sp]: [Matrix; 3] = std::array::from_fn(|k| {
+                squared(&product(view(&crosses[k]), view(&spectrum.eigen[k].vectors)))
+            });
+            let precision = view_slice(&spectrum.precision, b * c, a);
+            let contracted = product(precision, view(&su).transpose());
             (0..points.len())
                 .map(|p| {
                     let mut explained = 0.0;
@@ -242,7 +239,7 @@ impl LatticeGp {
         self.data.axis_variance(k, &self.hyper.kernels[k], x)
     }
 
-    fn cross_rows(&self, points: &[[f64; 3]]) -> [Mat<f64>; 3] {
+    fn cross_rows(&self, points: &[[f64; 3]]) -> [Matrix; 3] {
         std::array::from_fn(|k| self.cross(k, &points.iter().map(|p| p[k]).collect::<Vec<_>>()))
     }
 
@@ -253,23 +250,10 @@ impl LatticeGp {
     /// Those of [`LatticeGp::predict_variance_latent`].
     pub fn leave_one_out_residuals(&self) -> Result<Vec<f64>> {
         let Spectrum { eigen, precision } = self.spectrum()?;
-        let squares = eigen.each_ref().map(|e| {
-            let mut m = e.vectors.clone();
-            square(&mut m);
-            m
-        });
-        let diagonal = apply(squares.each_ref().map(Mat::as_ref), precision, 1);
+        let squares = eigen.each_ref().map(|e| squared(&e.vectors));
+        let diagonal = apply(squares.each_ref().map(view), precision, 1);
         let per_channel = self.weights.chunks(diagonal.len());
         Ok(per_channel.flat_map(|w| w.iter().zip(&diagonal).map(|(w, d)| w / d)).collect())
-    }
-}
-
-/// Squares every entry.
-pub(crate) fn square(m: &mut Mat<f64>) {
-    for column in m.col_iter_mut() {
-        for x in column.iter_mut() {
-            *x *= *x;
-        }
     }
 }
 

@@ -1,8 +1,7 @@
 //! A lattice process as a sum of products of well-scaled functions of one coordinate each.
 
-use faer::{Mat, MatRef};
-
 use crate::base::error::Result;
+use crate::base::linalg::{Matrix, product, view};
 use crate::gp::lattice::{LatticeGp, Spectrum};
 
 /// Below this share of the largest eigenvalue an eigenvector is rounding only.
@@ -24,7 +23,7 @@ pub struct SeparableForm<'a> {
     coefficients: Vec<f64>,
     unexplained: Vec<f64>,
     /// `Q L^(-1/2)` of each axis.
-    whitening: [Mat<f64>; 3],
+    whitening: [Matrix; 3],
 }
 
 /// The functions of one axis at some points.
@@ -51,14 +50,12 @@ impl<'a> SeparableForm<'a> {
             eigen.values.iter().map(root).collect::<Vec<f64>>()
         });
         let whitening = std::array::from_fn(|k| {
-            let mut m: Mat<f64> = eigen[k].vectors.clone();
-            for (column, &root) in m.col_iter_mut().zip(&roots[k]) {
-                let factor = if root > 0.0 { root.recip() } else { 0.0 };
-                column.iter_mut().for_each(|x| *x *= factor);
-            }
-            m
+            let (n, vectors) = (roots[k].len(), &eigen[k].vectors);
+            let factors: Vec<f64> =
+                roots[k].iter().map(|root| if *root > 0.0 { root.recip() } else { 0.0 }).collect();
+            Matrix::from_fn(n, n, |i, j| vectors[(i, j)] * factors[j])
         });
-        let transposed: [MatRef<'_, f64>; 3] = eigen.each_ref().map(|e| e.vectors.transpose());
+        let transposed = eigen.each_ref().map(|e| view(&e.vectors).transpose());
         let mut coefficients = crate::gp::contract(transposed, gp.weights(), gp.data().channels);
         let [a, b, c] = gp.data().shape();
         let products: Vec<f64> =
@@ -92,9 +89,9 @@ impl<'a> SeparableForm<'a> {
     /// The functions of axis `k` at `points`, given by their kernel coordinate.
     #[must_use]
     pub fn basis(&self, k: usize, points: &[f64]) -> AxisBasis {
-        let product = &self.gp.cross(k, points) * &self.whitening[k];
+        let product = product(view(&self.gp.cross(k, points)), view(&self.whitening[k]));
         let values: Vec<f64> =
-            product.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect();
+            (0..points.len()).flat_map(|i| product.row(i).iter().copied().collect::<Vec<_>>()).collect();
         let prior: Vec<f64> = points.iter().map(|&x| self.gp.axis_variance(k, x)).collect();
         let count = product.ncols();
         let explained = values.chunks(count).map(|row| row.iter().map(|x| x * x).sum::<f64>());
@@ -103,7 +100,7 @@ impl<'a> SeparableForm<'a> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fit", feature = "formats"))]
 mod tests {
     use super::*;
     use crate::formats::source::Source;

@@ -5,14 +5,13 @@
 //! depends on all three indices. A table takes `90 A B C + 90 180 B C` multiply-adds, `0.55 M B` kernel values, and
 //! for the variance `0.55 M B^2` more multiply-adds.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
 use crate::base::error::Result;
+use crate::base::linalg::{Matrix, product, product_into, product_into_slice, squared, view, view_slice};
 use crate::base::simd::vectorized;
 use crate::brdf::table::{N_PHI_D, N_THETA_D};
-use crate::gp::lattice::{LatticeGp, square};
+use crate::gp::lattice::LatticeGp;
 use crate::gp::table::TableGeometry;
 use crate::kernel::GridScratch;
 use crate::sample::space::WarpedBox;
@@ -33,10 +32,10 @@ pub(crate) fn bake_means<S: Send>(
     let geometry = TableGeometry::new(space.into());
     let along_u = gp.cross(0, geometry.first());
     let along_phi = gp.cross(2, geometry.third());
-    let contracted: Vec<Mat<f64>> =
+    let contracted: Vec<Matrix> =
         gp.weights().chunks(nodes).map(|weights| contract_u(gp, weights, &along_u)).collect();
     slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
-        let weights: Vec<Mat<f64>> = contracted.iter().map(|m| contract_phi(gp, m, i, &along_phi)).collect();
+        let weights: Vec<Matrix> = contracted.iter().map(|m| contract_phi(gp, m, i, &along_phi)).collect();
         let mut means = vec![0.0; weights.len() * N_THETA_D];
         for j in 0..N_COLUMNS {
             column.fill(gp, &geometry, i, j);
@@ -57,10 +56,8 @@ pub(crate) fn bake_variances<S: Send>(
 ) -> Result<()> {
     let spectrum = gp.spectrum()?;
     let geometry = TableGeometry::new(space.into());
-    let mut along_u = &gp.cross(0, geometry.first()) * &spectrum.eigen[0].vectors;
-    let mut along_phi = &gp.cross(2, geometry.third()) * &spectrum.eigen[2].vectors;
-    square(&mut along_u);
-    square(&mut along_phi);
+    let [along_u, along_phi] = [(0, geometry.first()), (2, geometry.third())]
+        .map(|(k, points)| squared(&product(view(&gp.cross(k, points)), view(&spectrum.eigen[k].vectors))));
     let contracted = contract_u(gp, &spectrum.precision, &along_u);
     // Along u and v the prior variance is the same everywhere.
     let priors: Vec<f64> = geometry.third().iter().map(|&phi| gp.prior_variance([0.0, 0.0, phi])).collect();
@@ -91,18 +88,17 @@ fn mirrored_rows(symmetry: Symmetry, j: usize) -> Vec<(usize, Vec<usize>)> {
 }
 
 /// `(B C) x 90` out of `A x B x C`.
-fn contract_u(gp: &LatticeGp, weights: &[f64], along_u: &Mat<f64>) -> Mat<f64> {
+fn contract_u(gp: &LatticeGp, weights: &[f64], along_u: &Matrix) -> Matrix {
     let [a, b, c] = gp.data().shape();
-    MatRef::from_column_major_slice(weights, b * c, a) * along_u.transpose()
+    product(view_slice(weights, b * c, a), view(along_u).transpose())
 }
 
 /// `rows x B` for one `i_theta_h`.
-fn contract_phi(gp: &LatticeGp, contracted: &Mat<f64>, i: usize, along_phi: &Mat<f64>) -> Mat<f64> {
+fn contract_phi(gp: &LatticeGp, contracted: &Matrix, i: usize, along_phi: &Matrix) -> Matrix {
     let [_, b, c] = gp.data().shape();
-    let slice: Vec<f64> = contracted.col(i).iter().copied().collect();
-    let mut out = Mat::zeros(along_phi.nrows(), b);
-    let plane = MatRef::from_column_major_slice(&slice, c, b);
-    matmul(out.as_mut(), Accum::Replace, along_phi, plane, 1.0, Par::Seq);
+    let slice: Vec<f64> = (0..b * c).map(|row| contracted[(row, i)]).collect();
+    let mut out = Matrix::zeros(along_phi.nrows(), b);
+    product_into(&mut out, view(along_phi), view_slice(&slice, c, b));
     out
 }
 
@@ -129,16 +125,14 @@ impl Column {
         gp.hyper().kernels[1].fill_grid(&self.v, nodes, &mut self.scratch, &mut self.kernels);
     }
 
-    fn project(&mut self, vectors: &Mat<f64>) {
+    fn project(&mut self, vectors: &Matrix) {
         let (count, nodes) = (self.v.len(), vectors.nrows());
         self.projected.resize(nodes * count, 0.0);
-        let kernels = MatRef::from_column_major_slice(&self.kernels, count, nodes);
-        let out = MatMut::from_column_major_slice_mut(&mut self.projected, count, nodes);
-        matmul(out, Accum::Replace, kernels, vectors.as_ref(), 1.0, Par::Seq);
+        product_into_slice(&mut self.projected, view_slice(&self.kernels, count, nodes), view(vectors));
     }
 
     /// Means `[channel][cell]` of one row of the contracted weights of each channel.
-    fn sum_means(&self, weights: &[Mat<f64>], row: usize, means: &mut [f64]) {
+    fn sum_means(&self, weights: &[Matrix], row: usize, means: &mut [f64]) {
         let count = self.v.len();
         for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
             let (sums, below) = means.split_at_mut(count);
@@ -149,7 +143,7 @@ impl Column {
     }
 
     /// Latent variances `[cell]` of one row of the contracted precisions.
-    fn sum_variances(&self, weights: &Mat<f64>, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
+    fn sum_variances(&self, weights: &Matrix, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);
         let weights: Vec<f64> = weights.row(row).iter().copied().collect();

@@ -52,6 +52,7 @@ fn points(data: &LatticeData) -> Vec<[f64; 3]> {
 /// The textbook dense process, by nalgebra.
 struct Oracle {
     inverse: DMatrix<f64>,
+    #[cfg(feature = "fit")]
     log_det: f64,
 }
 
@@ -66,8 +67,11 @@ fn oracle(data: &LatticeData, hyper: &LatticeHyper) -> Oracle {
     let mut k = DMatrix::from_fn(x.len(), x.len(), |i, j| kernel(data, hyper, &x[i], &x[j]));
     k += DMatrix::identity(x.len(), x.len()) * hyper.noise_variance;
     let cholesky = k.cholesky().unwrap();
-    let log_det = 2.0 * cholesky.l().diagonal().map(f64::ln).sum();
-    Oracle { inverse: cholesky.inverse(), log_det }
+    Oracle {
+        #[cfg(feature = "fit")]
+        log_det: 2.0 * cholesky.l().diagonal().map(f64::ln).sum(),
+        inverse: cholesky.inverse(),
+    }
 }
 
 #[test]
@@ -79,7 +83,6 @@ fn agrees_with_the_dense_process_written_out() {
         for hyper in cases() {
             let oracle = oracle(&data, &hyper);
             let gp = LatticeGp::new(data.clone(), hyper.clone()).unwrap();
-            let mut lml = 0.0;
             let queries: Vec<[f64; 3]> = (0..40)
                 .map(|i| [0.02 * f64::from(i), 0.7 - 0.01 * f64::from(i), 0.07 * f64::from(i)])
                 .collect();
@@ -89,7 +92,6 @@ fn agrees_with_the_dense_process_written_out() {
             for channel in 0..2 {
                 let y = DVector::from_column_slice(&data.targets[channel * n..][..n]);
                 let alpha = &oracle.inverse * &y;
-                lml -= 0.5 * (y.dot(&alpha) + oracle.log_det + n as f64 * (2.0 * std::f64::consts::PI).ln());
                 for (i, q) in queries.iter().enumerate() {
                     let k = DVector::from_fn(n, |j, _| kernel(&data, &hyper, q, &x[j]));
                     let (mean, found) = (k.dot(&alpha), means[2 * i + channel]);
@@ -101,6 +103,23 @@ fn agrees_with_the_dense_process_written_out() {
                     let left_out = alpha[i] / oracle.inverse[(i, i)];
                     assert!((left_out - residuals[channel * n + i]).abs() < 1e-10);
                 }
+            }
+        }
+    }
+}
+
+#[cfg(feature = "fit")]
+#[test]
+fn the_likelihood_is_that_of_the_dense_process_written_out() {
+    for axis in AXES {
+        let data = data(axis);
+        let n = data.len();
+        for hyper in cases() {
+            let oracle = oracle(&data, &hyper);
+            let mut lml = 0.0;
+            for y in data.targets.chunks(n).map(DVector::from_column_slice) {
+                let alpha = &oracle.inverse * &y;
+                lml -= 0.5 * (y.dot(&alpha) + oracle.log_det + n as f64 * (2.0 * std::f64::consts::PI).ln());
             }
             let found = data.likelihood(&hyper).unwrap().value;
             assert!((found / lml - 1.0).abs() < 1e-9, "{found} {lml}");
@@ -131,12 +150,17 @@ fn agrees_with_the_dense_solver() {
             for (a, b) in lattice.predict_variance_latent(&queries).unwrap().iter().zip(&variances) {
                 assert!((a / b - 1.0).abs() < 1e-8, "{a} {b}");
             }
-            let (a, b) = (data.likelihood(&hyper).unwrap().value, dense.log_marginal_likelihood().unwrap());
-            assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+            #[cfg(feature = "fit")]
+            {
+                let likelihood = data.likelihood(&hyper).unwrap().value;
+                let expected = dense.log_marginal_likelihood().unwrap();
+                assert!((likelihood / expected - 1.0).abs() < 1e-9, "{likelihood} {expected}");
+            }
         }
     }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn gradients_agree_with_finite_differences() {
     for axis in AXES {
@@ -176,6 +200,7 @@ fn gradients_agree_with_finite_differences() {
     }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn the_profiled_signal_variance_is_the_best_one() {
     let data = data(AXES[0]);
@@ -190,6 +215,7 @@ fn the_profiled_signal_variance_is_the_best_one() {
     }
 }
 
+#[cfg(feature = "fit")]
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let data = data(AXES[1]);

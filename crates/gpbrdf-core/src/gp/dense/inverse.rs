@@ -1,0 +1,47 @@
+//! The inverse of a covariance matrix, a block of columns at a time.
+//!
+//! Matrices are column-major and `n x n`; only the lower triangle is read.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
+use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+use super::factor::INVERSE_COLUMNS;
+
+/// Writes columns `first..first + width` of `L^-1`, from row `first` on, into `out`: column-major,
+/// `(n - first) x width`. What stands above is zero.
+///
+/// Cost: `(n - first)^2 width / 2` multiply-adds, in the calling thread.
+pub(crate) fn inverse_factor_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
+    let rows = n - first;
+    let factor = MatRef::from_column_major_slice(factor, n, n).submatrix(first, first, rows, rows);
+    let (corner, _, left, rest) = factor.split_at(width, width);
+    out.fill(0.0);
+    let (mut top, mut bottom) = MatMut::from_column_major_slice_mut(out, rows, width).split_at_row_mut(width);
+    invert_lower_triangular(top.as_mut(), corner, Par::Seq);
+    // [A 0; B C]^-1 = [A^-1 0; -C^-1 B A^-1 C^-1].
+    matmul(bottom.as_mut(), Accum::Replace, left, top.as_ref(), -1.0, Par::Seq);
+    solve_lower_triangular_in_place(rest, bottom, Par::Seq);
+}
+
+/// Writes columns `first..first + width` of `(L L^T)^-1`, from row `first` on, into `out`, shaped as in
+/// [`inverse_factor_columns`].
+///
+/// Solving with `L^T` upwards, the rows from `first` on need no row above. Cost: `(n - first)^2 width` multiply-adds,
+/// in the calling thread; `n^3 / 3` over all columns, as by way of the whole `L^-1`, but without a second matrix and
+/// with nothing to wait for between the blocks.
+pub(crate) fn inverse_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
+    inverse_factor_columns(factor, n, first, width, out);
+    let rows = n - first;
+    let factor = MatRef::from_column_major_slice(factor, n, n).submatrix(first, first, rows, rows);
+    let out = MatMut::from_column_major_slice_mut(out, rows, width);
+    solve_upper_triangular_in_place(factor.transpose(), out, Par::Seq);
+}
+
+/// The blocks of [`INVERSE_COLUMNS`] columns of `n`: first column and width.
+pub(crate) fn inverse_blocks(n: usize) -> impl IndexedParallelIterator<Item = (usize, usize)> {
+    let block = move |b| (b * INVERSE_COLUMNS, INVERSE_COLUMNS.min(n - b * INVERSE_COLUMNS));
+    (0..n.div_ceil(INVERSE_COLUMNS)).into_par_iter().with_max_len(1).map(block)
+}

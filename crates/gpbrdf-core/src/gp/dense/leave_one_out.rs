@@ -1,0 +1,58 @@
+//! Every sample of a dense process predicted from all others.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+
+use super::DenseGp;
+use super::factor::INVERSE_COLUMNS;
+use super::inverse::{inverse_blocks, inverse_factor_columns};
+use crate::base::error::Result;
+use crate::base::simd::dot;
+
+/// What the samples say about each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeaveOneOut {
+    /// `y_i - mu_i`, the target less its mean predicted from all other samples; `n` rows of one value a channel.
+    pub residuals: Vec<f64>,
+    /// Variance of that prediction, noise included; one a sample, shared by the channels.
+    pub variances: Vec<f64>,
+    /// `sum_i ln p(y_i | all others)` in nats, over samples and channels.
+    pub log_predictive_density: f64,
+}
+
+impl DenseGp {
+    /// Every sample predicted from all others, without refitting.
+    ///
+    /// `sigma_i^2 = 1 / [K^-1]_ii`, `mu_i = y_i - alpha_i sigma_i^2`. Source: C. E. Rasmussen and C. K. I. Williams,
+    /// "Gaussian Processes for Machine Learning" (2006), eqs. 5.10 to 5.12. Cost: `n^3 / 6` multiply-adds.
+    ///
+    /// # Errors
+    /// A process from a file whose covariance cannot be factorised.
+    pub fn leave_one_out(&self) -> Result<LeaveOneOut> {
+        let n = self.points.len();
+        let factor = self.factor()?;
+        // [K^-1]_ii is the squared norm of column i of L^-1.
+        let variances: Vec<Vec<f64>> = inverse_blocks(n)
+            .map_init(
+                || vec![0.0; n * INVERSE_COLUMNS],
+                |block, (first, width)| {
+                    let block = &mut block[..(n - first) * width];
+                    inverse_factor_columns(factor, n, first, width, block);
+                    block.chunks(n - first).map(|column| dot(column, column).recip()).collect()
+                },
+            )
+            .collect();
+        let variances = variances.concat();
+        let mut residuals = vec![0.0; n * self.channels];
+        let mut log_predictive_density = 0.0;
+        for (c, alpha) in self.alpha.chunks(n).enumerate() {
+            for (i, (alpha, variance)) in alpha.iter().zip(&variances).enumerate() {
+                let residual = alpha * variance;
+                residuals[i * self.channels + c] = residual;
+                log_predictive_density -= 0.5 * ((TAU * variance).ln() + residual * residual / variance);
+            }
+        }
+        Ok(LeaveOneOut { residuals, variances, log_predictive_density })
+    }
+}

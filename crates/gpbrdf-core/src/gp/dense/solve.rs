@@ -1,0 +1,52 @@
+//! From samples at any directions to a posterior.
+
+use std::sync::Arc;
+
+use super::DenseGp;
+use super::fit::DenseFit;
+use super::posterior::DensePosterior;
+use crate::base::error::Result;
+use crate::gp::hyper::Hyper;
+use crate::gp::posterior::Posterior;
+use crate::gp::problem::{Fitted, Problem};
+use crate::sample::lattice::LatticeLayout;
+use crate::sample::space::InputSpace;
+
+/// Finds hyper-parameters by maximum marginal likelihood and conditions. The first axis's shapes are those of the joint
+/// distance.
+pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
+    let (space, points) = inputs(problem)?;
+    let search = DenseFit {
+        x: points.as_flattened(),
+        targets: &problem.targets,
+        metrics: &space.metrics(),
+        shapes: &problem.kernel[0],
+        noise: problem.noise,
+        options: problem.optimize,
+    };
+    let (gp, report) = search.run(&|| problem.watch.evaluation())?;
+    Ok((Arc::new(DensePosterior { gp, space }), report))
+}
+
+/// Conditions at known hyper-parameters.
+pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
+    let (space, points) = inputs(problem)?;
+    let targets = &problem.targets;
+    let y: Vec<f64> = (0..points.len()).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
+    let gp = DenseGp::fit_at(
+        points.as_flattened(),
+        &y,
+        targets.len(),
+        hyper.kernel.clone(),
+        hyper.noise_variance,
+    )?;
+    let value = gp.log_marginal_likelihood()?;
+    Ok((Arc::new(DensePosterior { gp, space }), value))
+}
+
+/// The coordinates of the samples, and their space: that of the lattice, if they stand on one.
+fn inputs(problem: &Problem<'_>) -> Result<(InputSpace, Vec<[f64; 3]>)> {
+    let space = problem.lattice.map_or(problem.space, |lattice: &LatticeLayout| lattice.space().into());
+    space.validate()?;
+    Ok((space, problem.angles.iter().map(|&angles| space.coordinates(angles)).collect()))
+}
