@@ -9,3 +9,8 @@ mod output;
 mod reproduce;
 #[cfg(feature = "viewer")]
 pub mod viewer;
+
+/// The examples of the README, which are tests of documentation.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -82,3 +82,8 @@ pub use model::{CompressOptions, Fit, FitOptions, InducingSize, compress, condit
 pub use sample::{
     LatticeLayout, Layout, MeanFunction, Provenance, Sample, SampleSet, Symmetry, Transform, detect_symmetry,
 };
+
+/// The examples of this crate's README, which are tests of documentation.
+#[cfg(all(doctest, feature = "fit", feature = "formats"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -91,3 +91,8 @@ pub mod twin {
     pub use crate::scene::gbuffer::{GBuffer, SurfaceTexel};
     pub use crate::scene::twin::{TwinLight, shade_on_cpu};
 }
+
+/// The examples of this crate's README, which are tests of documentation.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
