@@ -46,7 +46,7 @@ pub(crate) struct ModelSpec {
     #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
     pub(crate) node_density: Option<f64>,
     /// Exact solver.
-    #[arg(long, default_value = "auto", value_parser = named::<Solver>(&["auto", "lattice", "dense"]))]
+    #[arg(long, default_value = "auto", value_parser = named::<Solver>(&Solver::NAMES))]
     pub(crate) solver: Solver,
     /// Kernel shapes, summed: se, rq, matern12, matern32, matern52, matern (with --nu). On a lattice there
     /// may be three such sums joined by commas, for theta_h, theta_d and phi_d.

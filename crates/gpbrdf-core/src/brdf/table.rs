@@ -82,17 +82,12 @@ impl Trilinear {
         let (p0, p1, wp) = periodic(fold_phi_d(angles.phi_d) / PI, N_PHI_D);
         let mut cells = [0; 8];
         let mut weights = [0.0; 8];
-        let mut k = 0;
-        for (h, a) in [(h0, 1.0 - wh), (h1, wh)] {
-            for (d, b) in [(d0, 1.0 - wd), (d1, wd)] {
-                for (p, c) in [(p0, 1.0 - wp), (p1, wp)] {
-                    #[expect(clippy::cast_possible_truncation, reason = "a table has 1,458,000 cells")]
-                    {
-                        cells[k] = cell_index(h, d, p) as u32;
-                        weights[k] = (a * b * c) as f32;
-                    }
-                    k += 1;
-                }
+        let corners = trilinear_corners([(h0, h1, wh), (d0, d1, wd), (p0, p1, wp)]);
+        for ((cell, weight), ([h, d, p], w)) in cells.iter_mut().zip(&mut weights).zip(corners) {
+            #[expect(clippy::cast_possible_truncation, reason = "a table has 1,458,000 cells")]
+            {
+                *cell = cell_index(h, d, p) as u32;
+                *weight = w as f32;
             }
         }
         Self { cells, weights }
@@ -102,6 +97,16 @@ impl Trilinear {
     pub fn corners(&self) -> impl Iterator<Item = (usize, f32)> + '_ {
         self.cells.iter().zip(&self.weights).map(|(&cell, &weight)| (cell as usize, weight))
     }
+}
+
+/// The eight corners of a trilinear interpolation and their weights, from the lower node, the upper node and the weight
+/// of the upper node along each axis.
+pub(crate) fn trilinear_corners(axes: [(usize, usize, f64); 3]) -> [([usize; 3], f64); 8] {
+    let ends = axes.map(|(low, high, weight)| [(low, 1.0 - weight), (high, weight)]);
+    std::array::from_fn(|corner| {
+        let [(h, a), (d, b), (p, c)] = [ends[0][corner >> 2], ends[1][corner >> 1 & 1], ends[2][corner & 1]];
+        ([h, d, p], a * b * c)
+    })
 }
 
 /// The lower node, the upper node and the weight of the upper one at `t`, for `n` cell centres over `[0, 1]`.

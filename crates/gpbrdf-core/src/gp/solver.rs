@@ -29,6 +29,9 @@ pub enum Solver {
 }
 
 impl Solver {
+    /// The names in files and on the command line.
+    pub const NAMES: [&'static str; 3] = ["auto", "lattice", "dense"];
+
     /// The solver that samples get: on a lattice or on any points.
     #[must_use]
     pub fn resolve(self, on_lattice: bool) -> Self {

@@ -32,7 +32,8 @@ fn columns() -> Vec<String> {
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when a column is missing, a value is not a
 /// finite number, or there is no row.
-pub fn read_neural_csv(path: &Path) -> Result<Vec<(String, NeuralBrdf)>> {
+pub fn read_neural_csv(path: impl AsRef<Path>) -> Result<Vec<(String, NeuralBrdf)>> {
+    let path = path.as_ref();
     let bytes = read_bytes(path, FORMAT, MAX_BYTES)?;
     let bad = |expected: String, found: String| Error::Format {
         format: FORMAT,

@@ -6,6 +6,7 @@ use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::table::{
     N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, cell_center, cell_index, cell_indices, mirrored_column,
+    trilinear_corners,
 };
 use crate::gp::posterior::Posterior;
 use crate::gp::table::{MeanTable, to_f32};
@@ -76,19 +77,8 @@ pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Ve
                     p = mirrored_column(p);
                 }
                 let axes = [between(h, shape[0]), between(d, shape[1]), between(p, shape[2])];
-                let mut sum = 0.0;
-                for corner in 0..8usize {
-                    let pick = |k: usize| {
-                        let (low, weight) = axes[k];
-                        if corner >> k & 1 == 0 {
-                            (low, 1.0 - weight)
-                        } else {
-                            ((low + 1).min(shape[k] - 1), weight)
-                        }
-                    };
-                    let ((h, a), (d, b), (p, c)) = (pick(0), pick(1), pick(2));
-                    sum += a * b * c * sigma[(h * shape[1] + d) * shape[2] + p];
-                }
+                let at = |[h, d, p]: [usize; 3]| sigma[(h * shape[1] + d) * shape[2] + p];
+                let sum = trilinear_corners(axes).iter().map(|&(knot, weight)| weight * at(knot)).sum();
                 to_f32(sum)
             })
             .collect()
@@ -96,8 +86,8 @@ pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Ve
     Ok(planes.collect())
 }
 
-/// The knot below a cell and the weight of the one above; the ends are held.
-fn between(cell: usize, knots: usize) -> (usize, f64) {
+/// The knots below and above a cell and the weight of the one above; the ends are held.
+fn between(cell: usize, knots: usize) -> (usize, usize, f64) {
     let x = (cell as f64 - (STEP / 2) as f64) / STEP as f64;
     let x = x.clamp(0.0, (knots - 1) as f64);
     #[expect(
@@ -106,5 +96,5 @@ fn between(cell: usize, knots: usize) -> (usize, f64) {
         reason = "x lies within [0, knots - 1]"
     )]
     let low = x as usize;
-    (low, x - low as f64)
+    (low, (low + 1).min(knots - 1), x - low as f64)
 }
