@@ -95,13 +95,13 @@ mod tests {
             let message = read_neural_csv(&path).unwrap_err().to_string();
             assert!(message.contains(said), "{message}");
         }
-        assert!(read_neural_csv(&folder.path().join("absent.csv")).is_err());
+        assert!(read_neural_csv(folder.path().join("absent.csv")).is_err());
     }
 
     #[test]
     fn published_fits_are_near_their_measurements() {
         let Some(dir) = data_dir() else { return };
-        let fits = read_neural_csv(&dir.join("rgl/nbrdf_weights.csv")).unwrap();
+        let fits = read_neural_csv(dir.join("rgl/nbrdf_weights.csv")).unwrap();
         let fit = &fits.iter().find(|(name, _)| name.starts_with("paper_blue")).unwrap().1;
         let source = Source::open(dir.join("rgl/paper_blue_rgb.bsdf")).unwrap();
         let truth = source.brdf().unwrap();
