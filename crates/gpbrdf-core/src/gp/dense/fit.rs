@@ -93,7 +93,7 @@ impl DenseFit<'_> {
 /// Number of samples in the subset that is searched first, from several starts.
 const SCOUTS: usize = 160;
 
-/// Up to this number of samples a search takes about a second, so it runs to its end from both starts.
+/// Up to this number of samples a search takes about a second, so searches from both starts run to their end.
 const FEW: usize = 1000;
 
 /// With more samples, the number of iterations after which only the better of the two starts continues.

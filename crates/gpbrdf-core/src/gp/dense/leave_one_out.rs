@@ -31,7 +31,7 @@ impl DenseGp {
     /// multiply-adds.
     ///
     /// # Errors
-    /// A process that was loaded from a file, and whose covariance cannot be factorised or does not fit in
+    /// A process that was loaded from a file and whose covariance cannot be factorised or does not fit in
     /// memory.
     pub fn leave_one_out(&self) -> Result<LeaveOneOut> {
         let n = self.points.len();

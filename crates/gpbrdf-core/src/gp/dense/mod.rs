@@ -192,7 +192,7 @@ impl DenseGp {
     /// The log marginal likelihood, summed over the channels; the paper's eq. 16.
     ///
     /// # Errors
-    /// A process that was loaded from a file, and whose covariance cannot be factorised or does not fit in
+    /// A process that was loaded from a file and whose covariance cannot be factorised or does not fit in
     /// memory.
     pub fn log_marginal_likelihood(&self) -> Result<f64> {
         Ok(log_marginal_likelihood(&self.y, &self.alpha, self.factor()?, self.points.len()))

@@ -3,8 +3,8 @@
 //! A column of a table, the cells along `theta_d` of one `(i_theta_h, i_phi_d)`, ends at its own
 //! `theta_d_max`. Each column is therefore resampled at evenly spaced `v = theta_d / theta_d_max`, by linear
 //! interpolation of its targets and with at least one point per cell. On the resulting full grid, a product
-//! of functions of `u`, `v` and `phi` is a product as well. A point's weight is proportional to the number of
-//! valid cells of its column, so resampling does not favour short columns.
+//! of functions of `u`, `v` and `phi` is a product as well. Other things being equal, a point's weight is
+//! proportional to the number of valid cells of its column, so resampling does not favour short columns.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -18,8 +18,8 @@ use crate::brdf::table::{BrdfTable, N_PHI_D, N_THETA_D, N_THETA_H, cell_center, 
 use crate::sample::symmetry::Symmetry;
 use crate::sample::target::Transform;
 
-/// Weights fall off to this share towards the horizon, among directions whose cosine is below
-/// [`GRAZING_COSINE`] and which are black in pictures.
+/// Weights of directions whose cosine is below [`GRAZING_COSINE`], which are black in pictures, fall off to
+/// this share towards the horizon.
 const GRAZING_SHARE: f64 = 0.02;
 
 /// Targets and weights of a table on the grid `[u][v][phi]`.

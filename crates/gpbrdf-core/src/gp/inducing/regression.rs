@@ -71,8 +71,8 @@ pub(crate) struct Regression {
 ///
 /// The normal matrix is summed one axis at a time: products of pairs of functions first along `phi`, then
 /// along `v`, then along `u`. For `U x V x P` points and `A x B x C` nodes this costs
-/// `U V P C^2 + U V B^2 C^2 + U A^2 B^2 C^2` multiply-adds, up to 8 times fewer by symmetry, and the Cholesky
-/// factor `(A B C)^3 / 6`.
+/// `U V P C^2 + U V B^2 C^2 + U A^2 B^2 C^2` multiply-adds, up to 8 times fewer by symmetry. The Cholesky
+/// factor costs `(A B C)^3 / 6`.
 ///
 /// # Errors
 /// A normal matrix without a Cholesky factor.
@@ -111,8 +111,8 @@ pub(crate) fn regress(
         })
         .collect();
     let diagonal: f64 = matrix.iter().step_by(m + 1).sum::<f64>() / m as f64;
-    // For nodes without data the matrix holds little but rounding errors. The jitter that makes up for them
-    // is far below the contribution of anything that was measured.
+    // For nodes without data the matrix holds little but rounding errors. The jitter that counters them is
+    // far below the contribution of anything that was measured.
     matrix.iter_mut().step_by(m + 1).for_each(|x| *x += 1e-13 * diagonal);
     if !factorize(&mut matrix, m) {
         return Err(Error::NotPositiveDefinite { size: m, largest_jitter: 1e-13 });

@@ -8,7 +8,7 @@ use crate::base::linalg::{Matrix, View, product_into, product_into_slice, view, 
 ///
 /// `x` is `[channel][A][B][C]`, last index fastest, with `M_u` of shape `A' x A` and so on; the result is
 /// `[channel][A'][B'][C']`. Costs `A B B' C + A B' C C' + A A' B' C'` multiply-adds per channel. Every
-/// element of the result is summed in one fixed order, so it does not depend on the number of threads.
+/// element is summed in one fixed order, so the result does not depend on the number of threads.
 pub(crate) fn apply(matrices: [View<'_>; 3], x: &[f64], channels: usize) -> Vec<f64> {
     let [m_u, m_v, m_phi] = matrices;
     let [a_in, b_in, c_in] = matrices.map(|m| m.ncols());

@@ -15,9 +15,10 @@ const SMALLEST_SHARE: f64 = 1e-15;
 /// `a(x) = L^(-1/2) Q^T k(X, x)` is never longer than the prior standard deviation, and the coefficients
 /// `L^(1/2) Q^T w` are about as large as the targets.
 ///
-/// The variance is a sum of positive terms in the same functions: `s^2 (r_0 p_1 p_2 + s_0 r_1 p_2 + s_0 s_1
-/// r_2 + sum_ijk unexplained_ijk a_i^2 b_j^2 c_k^2)`, where along each axis `p` is the prior variance,
-/// `s = sum_i a_i^2` is the part of it that noise-free nodes explain, and `r = p - s`.
+/// The variance is a sum of positive terms in the same functions:
+/// `s^2 (r_0 p_1 p_2 + s_0 r_1 p_2 + s_0 s_1 r_2 + sum_ijk unexplained_ijk a_i^2 b_j^2 c_k^2)`, where along
+/// each axis `p` is the prior variance, `s = sum_i a_i^2` is the part of it that noise-free nodes explain,
+/// and `r = p - s`.
 #[derive(Clone, Debug)]
 pub struct SeparableForm<'a> {
     gp: &'a LatticeGp,

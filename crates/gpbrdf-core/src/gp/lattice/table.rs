@@ -3,8 +3,8 @@
 //! The contractions along `u` and `phi` come first, for all cells at once. Each column (the 90 cells along
 //! `theta_d` of one `(i_theta_h, i_phi_d)`) is then summed over the `B` nodes along `v`, because
 //! `v = theta_d / theta_d_max(theta_h, phi_d)` depends on all three indices. A table takes
-//! `90 A B C + 90 180 B C` multiply-adds and 0.55 million `B` kernel values, and the variance takes 0.55
-//! million `B^2` more multiply-adds.
+//! `90 A B C + 90 180 B C` multiply-adds and `0.55e6 B` kernel values, and the variance takes `0.55e6 B^2`
+//! more multiply-adds.
 
 use rayon::prelude::*;
 
