@@ -6,33 +6,34 @@ use crate::base::error::{Error, Result};
 use crate::gp::solver::Solver;
 use crate::kernel::{Kernel, KernelBody, ParameterKind};
 
-/// The smallest ratio of noise to signal variance, which keeps the covariance positive definite in f64.
+/// The smallest ratio of noise variance to signal variance. It keeps the covariance positive definite in f64.
 pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
 
-/// The names along the three axes of the warped box.
+/// Names of the three axes of the warped box.
 pub(crate) const AXIS_NAMES: [&str; 3] = ["u", "v", "phi"];
 
 /// The hyper-parameters of a process whose channels share them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hyper {
-    /// The solver that they are for.
+    /// The solver that these hyper-parameters belong to.
     pub solver: Solver,
-    /// The kernel, variances included. On a lattice it is one product term.
+    /// The kernel, with the variances of its terms. For the lattice solver it is a single product term.
     pub kernel: Kernel,
     /// Noise variance, in squared target units.
     pub noise_variance: f64,
 }
 
-/// What a hyper-parameter is.
+/// The role of a hyper-parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HyperKind {
     /// The variance of a term of the kernel, in squared target units.
     SignalVariance,
-    /// The share of a term along one axis.
+    /// The weight of one term in the sum of kernels along one axis.
     Weight,
     /// The length scale along the axis of this index, in the unit of the coordinate.
     LengthScale(usize),
-    /// The mixture parameter of a rational quadratic: along the axis of this index, or of the joint distance.
+    /// The mixture parameter `alpha` of a rational quadratic kernel: `Some(k)` for a kernel along axis `k`,
+    /// `None` for a kernel of the joint distance.
     Alpha(Option<usize>),
     /// The noise variance, in squared target units.
     NoiseVariance,
@@ -41,14 +42,15 @@ pub enum HyperKind {
 /// One hyper-parameter and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HyperParameter {
-    /// What it is.
+    /// The role of this hyper-parameter.
     pub kind: HyperKind,
     /// Its value, positive.
     pub value: f64,
 }
 
 impl Hyper {
-    /// All hyper-parameters: those of the kernel in the order of [`Kernel::log_parameters`], then the noise variance.
+    /// All hyper-parameters: the kernel's, in the order of [`Kernel::log_parameters`], followed by the noise
+    /// variance.
     #[must_use]
     pub fn parameters(&self) -> Vec<HyperParameter> {
         let mut kinds = Vec::with_capacity(self.kernel.n_parameters() + 1);
@@ -76,10 +78,10 @@ impl Hyper {
         kinds.into_iter().zip(values).map(|(kind, value)| HyperParameter { kind, value }).collect()
     }
 
-    /// Sets the hyper-parameter at `index` of [`Hyper::parameters`].
+    /// Sets the hyper-parameter at position `index` of [`Hyper::parameters`].
     ///
     /// # Errors
-    /// A value that is not positive and finite, or an index that none has.
+    /// A value that is not positive and finite, or an index out of range.
     pub fn set(&mut self, index: usize, value: f64) -> Result<()> {
         if !(value > 0.0 && value.is_finite()) {
             return Err(Error::argument("hyper-parameter", "a positive number", value));

@@ -1,4 +1,5 @@
-//! Gaussian processes: exact on any points and on product lattices, and sparse on an inducing lattice.
+//! Gaussian processes: an exact one for any points, an exact one for product lattices, and a sparse one on
+//! inducing lattices.
 
 mod hyper;
 #[cfg(feature = "fit")]

@@ -15,28 +15,30 @@ use crate::base::random::SplitMix64;
 /// One parameter of a maximisation, on a logarithmic scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// What it is, for reports, for example `length_scale[0]`.
+    /// Name of the parameter in reports, for example `length_scale[0]`.
     pub name: String,
-    /// Where the search starts, natural logarithm.
+    /// Natural logarithm of the value at which the search starts.
     pub start: f64,
-    /// Lower bound, natural logarithm.
+    /// Natural logarithm of the lower bound.
     pub lower: f64,
-    /// Upper bound, natural logarithm.
+    /// Natural logarithm of the upper bound.
     pub upper: f64,
 }
 
-/// How long and from how many places to search.
+/// Limits of a search, and the number of its starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OptimizeOptions {
-    /// L-BFGS iterations per start.
+    /// Largest number of L-BFGS iterations per start.
     pub max_iterations: u64,
-    /// The search ends when the norm of the gradient of the mean log-likelihood of a sample falls below this.
+    /// The search ends when the norm of the gradient of the log-likelihood, divided by the number of targets,
+    /// falls below this.
     pub gradient_tolerance: f64,
-    /// The search ends when an iteration gains less than this in the mean log-likelihood of a sample.
+    /// The search ends when an iteration gains less than this in the log-likelihood divided by the number of
+    /// targets.
     pub gain_tolerance: f64,
-    /// Further starts, drawn uniformly within the bounds.
+    /// Number of additional starts, drawn uniformly between the logarithmic bounds.
     pub restarts: usize,
-    /// Seed of those starts.
+    /// Seed of the random numbers from which the additional starts are drawn.
     pub seed: u64,
 }
 
@@ -49,37 +51,40 @@ impl Default for OptimizeOptions {
 /// The outcome of a maximisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimum {
-    /// Best parameters found, natural logarithms.
+    /// Natural logarithms of the best parameters found.
     pub log_parameters: Vec<f64>,
-    /// The objective there.
+    /// Value of the objective at these parameters.
     pub value: f64,
-    /// Evaluations of objective and gradient, all starts together.
+    /// Number of evaluations of the objective and its gradient, over all starts.
     pub evaluations: usize,
-    /// Whether the best start ended by one of the tolerances.
+    /// Whether the search from the best start ended because it reached one of the tolerances.
     pub converged: bool,
-    /// Names of the parameters that ended at a bound.
+    /// Names of the parameters that ended at one of their bounds.
     pub at_bound: Vec<String>,
 }
 
 /// Maximises `objective` (its value and gradient in log-parameters) within bounds.
 ///
-/// Bounds enter by the substitution `p = lower + (upper - lower) (1 + sin x) / 2`, and the objective is divided
-/// by `samples`, so tolerances mean the same at every data size. L-BFGS of `argmin` with the line search of
-/// More and Thuente; where that one fails, the search goes on from the best point with Hager and Zhang's, then
-/// with backtracking. Points where the objective fails (an indefinite covariance) count as infinitely bad.
+/// Bounds enter by the substitution `p = lower + (upper - lower) (1 + sin x) / 2`, and the search runs over
+/// the free variable `x`. The objective is divided by the number of targets, so that tolerances
+/// mean the same for every amount of data. The method is the L-BFGS of `argmin` with the line search of More
+/// and Thuente. Where that line search fails, the search continues from the best point with the one of Hager
+/// and Zhang, and after that with backtracking. A point at which the objective fails, for example because a
+/// covariance is not positive definite, is treated as infinitely bad.
 ///
 /// # Errors
-/// The objective's own error where it fails at every start.
+/// [`Error::Cancelled`] as soon as the objective returns it. Where the objective is finite at no point of any
+/// start, the last error that it returned, or [`Error::InvalidArgument`] if it returned none.
 pub fn maximize<F>(
     parameters: &[Parameter],
-    samples: usize,
+    n_targets: usize,
     options: &OptimizeOptions,
     objective: F,
 ) -> Result<Optimum>
 where
     F: FnMut(&[f64]) -> Result<(f64, Vec<f64>)>,
 {
-    let scale = 1.0 / samples.max(1) as f64;
+    let scale = 1.0 / n_targets.max(1) as f64;
     let shared = Rc::new(RefCell::new(Shared {
         objective,
         parameters: parameters.to_vec(),
@@ -97,7 +102,7 @@ where
             .map(|p| {
                 let fraction =
                     if start == 0 { (p.start - p.lower) / (p.upper - p.lower) } else { random.next_unit() };
-                // Kept off the ends, where the substitution has no slope.
+                // The start is kept away from the bounds, where the substitution has a slope of zero.
                 (2.0 * fraction.clamp(0.02, 0.98) - 1.0).asin()
             })
             .collect();
@@ -144,12 +149,12 @@ where
 }
 
 impl Parameter {
-    /// The bounded value at the free variable `x`.
+    /// The parameter that belongs to the free variable `x`.
     fn at(&self, x: f64) -> f64 {
         self.lower + (self.upper - self.lower) * 0.5 * (1.0 + x.sin())
     }
 
-    /// Its derivative.
+    /// The derivative of [`Parameter::at`] in `x`.
     fn slope(&self, x: f64) -> f64 {
         (self.upper - self.lower) * 0.5 * x.cos()
     }
@@ -162,7 +167,8 @@ enum LineSearchKind {
     Backtracking,
 }
 
-/// The objective with a memory of its last and best points: argmin asks for value and gradient one by one.
+/// The objective with a memory of its last and its best point. argmin requests value and gradient in separate
+/// calls, so without the memory every point would be evaluated twice.
 struct Shared<F> {
     objective: F,
     parameters: Vec<Parameter>,
@@ -174,7 +180,7 @@ struct Shared<F> {
 }
 
 impl<F: FnMut(&[f64]) -> Result<(f64, Vec<f64>)>> Shared<F> {
-    /// Negative scaled objective and its gradient in the free variables.
+    /// The negative scaled objective, which argmin minimises, and its gradient in the free variables.
     fn evaluate(&mut self, x: &[f64]) -> Result<(f64, Vec<f64>), ArgminError> {
         if let Some((known, cost, gradient)) = &self.last
             && known.as_slice() == x
@@ -227,7 +233,8 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vec<f64>)>> Gradient for Problem<F> {
     }
 }
 
-/// One L-BFGS run; `Some(ended by tolerance)`, or `None` where the line search failed.
+/// Runs L-BFGS once. Returns whether the run ended because it reached a tolerance, or `None` where the line
+/// search failed.
 fn run<F>(
     search: LineSearchKind,
     shared: &Rc<RefCell<Shared<F>>>,

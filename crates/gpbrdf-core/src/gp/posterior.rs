@@ -1,4 +1,4 @@
-//! The one door to every solver: what a model needs of a conditioned process.
+//! The interface between models and solvers: everything that a model needs from a conditioned process.
 
 use std::fmt::Debug;
 
@@ -15,71 +15,78 @@ use crate::sample::space::{InputSpace, WarpedBox};
 
 /// A Gaussian process conditioned on the targets of one channel, or of several that share hyper-parameters.
 ///
-/// Targets have zero mean; the model adds the prior mean and carries values back to sr^-1. A new solver implements this
-/// trait in a folder of its own and is entered in `gp/solver.rs`.
+/// Targets have zero mean: the model adds the prior mean and transforms values back to sr^-1. A new solver
+/// implements this trait in a folder of its own and is registered in `gp/solver.rs`.
 pub trait Posterior: Debug + Send + Sync {
     /// Name of the solver in reports and model files.
     fn solver(&self) -> &'static str;
 
-    /// Name of the solver for people.
+    /// Name of the solver as it is shown to users.
     fn label(&self) -> &'static str;
 
-    /// From directions to the coordinates that the kernel compares; of the first component where they differ.
+    /// The map from directions to the coordinates of the kernel. Where components have spaces of their own,
+    /// it is the space of the first one.
     fn space(&self) -> InputSpace;
 
     /// The number of channels.
     fn n_channels(&self) -> usize;
 
-    /// The number of measured directions, or of table cells that a compressed table was fitted to.
+    /// The number of measured directions, or the number of table cells that a compressed table was fitted to.
     fn n_data(&self) -> usize;
 
-    /// Numbers that are stored: values or weights of all channels, positions, and hyper-parameters.
+    /// The count of numbers that are stored: values or weights of all channels, positions, and
+    /// hyper-parameters.
     fn n_floats(&self) -> usize;
 
     /// Noise variance of each channel, in squared target units.
     fn noise_variances(&self) -> Vec<f64>;
 
-    /// How many variances there are for each direction: 1 where the channels share it, else one per channel.
+    /// The number of variances per direction: 1 where the channels share their variance, else one per
+    /// channel.
     fn n_variances(&self) -> usize {
         1
     }
 
-    /// Posterior mean `[direction][channel]`. Angles that are not finite give NaN.
+    /// Posterior mean, `[direction][channel]`. Angles that are not finite give NaN.
     fn predict_mean(&self, angles: &[HalfDiff]) -> Vec<f64>;
 
-    /// Posterior variance of the noise-free function, `[direction][variance]` with [`Posterior::n_variances`] for each
-    /// direction. The first call may factorise what only variances need.
+    /// Posterior variance of the noise-free function, `[direction][variance]`, with
+    /// [`Posterior::n_variances`] values per direction. The first call may factorise a covariance that only
+    /// variances need.
     ///
     /// # Errors
     /// A covariance that cannot be factorised or does not fit in memory, or angles that are not finite.
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>>;
 
-    /// The hyper-parameters, to condition another process at; `None` where there are no measurements to condition on.
+    /// The hyper-parameters, with which another process can be conditioned. `None` where there are no
+    /// measurements to condition on.
     fn hyper(&self) -> Option<Hyper>;
 
-    /// Name of the kernel, for reports.
+    /// Name of the kernel for reports.
     fn kernel_name(&self) -> String;
 
-    /// The hyper-parameters as they stand in reports.
+    /// The hyper-parameters as JSON for reports.
     fn report(&self) -> Value;
 
-    /// Writes everything that is not small into tensors and returns the rest, from which the solver's `load` makes the
-    /// same process.
+    /// Writes the large arrays into `tensors` and returns the rest as JSON. The solver's `load` makes the
+    /// same process from both.
     ///
     /// # Errors
     /// Numbers that JSON cannot hold.
     fn save(&self, tensors: &mut TensorWriter) -> Result<Value>;
 
-    /// What a graphics device evaluates.
+    /// The form in which a graphics device evaluates the posterior.
     fn device_form(&self) -> DeviceForm<'_>;
 
-    /// Evaluates the mean in every cell of a table. By default at each distinct cell, one block of directions at a time.
+    /// Evaluates the mean in every cell of a table. The default implementation predicts the mean of every
+    /// distinct cell, one slab of directions at a time.
     fn bake_mean(&self, table: &mut MeanTable<'_>) {
         table::points::bake_mean(self, table);
     }
 
-    /// The latent standard deviation in every cell of a table, as one plane in MERL order for each of
-    /// [`Posterior::n_variances`]. By default on every third cell along each axis, interpolated between.
+    /// The latent standard deviation in every cell of a table, as one plane in MERL order for each of the
+    /// [`Posterior::n_variances`]. The default implementation predicts it in every third cell along each axis
+    /// and interpolates between them.
     ///
     /// # Errors
     /// Those of [`Posterior::predict_variance`].
@@ -88,13 +95,13 @@ pub trait Posterior: Debug + Send + Sync {
     }
 }
 
-/// The two forms of a posterior that a graphics device evaluates.
+/// The two forms in which a graphics device can evaluate a posterior.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum DeviceForm<'a> {
-    /// Sums of products of one function per axis, added up.
+    /// Sums of products with one function per axis; the parts are added up.
     Separable(Vec<SeparablePart<'a>>),
-    /// Sums of kernel values over samples.
+    /// Weighted sums of kernel values over the samples.
     KernelSum(KernelSum<'a>),
 }
 
@@ -103,23 +110,24 @@ pub enum DeviceForm<'a> {
 pub struct SeparablePart<'a> {
     /// The process.
     pub gp: &'a LatticeGp,
-    /// From directions to its coordinates.
+    /// The map from directions to the coordinates of the process.
     pub space: WarpedBox,
-    /// If the process is a component of one channel that is mixed into colours: the weight of its mean in each channel.
-    /// The weights of its variance are their squares.
+    /// For a process that is a component of one channel and is mixed into colours, the weight of its mean in
+    /// each channel; the weights of its variance are the squares of these. `None` for a process with channels
+    /// of its own.
     pub colour: Option<[f64; 3]>,
 }
 
-/// `mean_c(x) = sum_i weights_ic k(x, x_i)`.
+/// A posterior mean as a sum over the samples: `mean_c(x) = sum_i weights_ic k(x, x_i)`.
 #[derive(Clone, Debug)]
 pub struct KernelSum<'a> {
     /// The kernel.
     pub kernel: &'a Kernel,
-    /// From directions to coordinates.
+    /// The map from directions to the coordinates of the kernel.
     pub space: InputSpace,
     /// Coordinates of the samples, `n` rows of three.
     pub inputs: &'a [f64],
-    /// `n` rows of one weight per channel.
+    /// Weights of the samples, `n` rows with one value per channel.
     pub weights: Vec<f64>,
     /// The number of channels.
     pub n_channels: usize,

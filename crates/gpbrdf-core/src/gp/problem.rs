@@ -1,4 +1,4 @@
-//! What a solver is given to fit, and who watches it.
+//! The input of a fit, and the observer that can stop it.
 
 use std::cell::Cell;
 use std::fmt;
@@ -14,36 +14,39 @@ use crate::kernel::Shape;
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::space::InputSpace;
 
-/// A posterior and how the search for its hyper-parameters went.
+/// A posterior and the report of the search for its hyper-parameters.
 pub(crate) type Fitted = (Arc<dyn Posterior>, FitReport);
 
-/// What a solver is given: directions, zero-mean targets of channels that share hyper-parameters, and how to search.
+/// The input of a solver: directions, zero-mean targets of channels that share hyper-parameters, and the
+/// settings of the search.
 pub(crate) struct Problem<'a> {
     /// Directions of the samples.
     pub(crate) angles: &'a [HalfDiff],
-    /// The lattice that they stand on, if they do, in its order.
+    /// The lattice on which the samples lie, in the order of its nodes; `None` for samples off a lattice.
     pub(crate) lattice: Option<&'a LatticeLayout>,
-    /// `[channel][sample]`.
+    /// Zero-mean targets, `[channel][sample]`.
     pub(crate) targets: Vec<Vec<f64>>,
-    /// Input space of samples off the lattice.
+    /// Input space for samples off a lattice.
     pub(crate) space: InputSpace,
-    /// Shapes of the kernel of each axis, summed.
+    /// For each axis, the shapes whose kernels are summed.
     pub(crate) kernel: &'a [Vec<Shape>; 3],
     /// The rule for the noise variance.
     pub(crate) noise: Noise,
-    /// How long to search.
+    /// Settings of the search.
     pub(crate) optimize: &'a OptimizeOptions,
-    /// Called before each evaluation of the likelihood.
+    /// Counts the evaluations of the likelihood and calls the observer before each of them.
     pub(crate) watch: &'a Watch<'a>,
 }
 
-/// Called before each evaluation of a likelihood with the number of evaluations so far, this one included; it decides
-/// whether the search goes on.
+/// A callback that runs before each evaluation of a likelihood. It receives the number of evaluations so far,
+/// including the one that is about to run, and decides whether the search continues. The default observer
+/// lets every search run to its end.
 #[derive(Clone, Default)]
 pub struct Observer(Option<Arc<dyn Fn(usize) -> ControlFlow<()> + Send + Sync>>);
 
 impl Observer {
-    /// An observer. A search that it breaks off ends with [`Error::Cancelled`].
+    /// An observer that calls `observe`. A search in which it returns [`ControlFlow::Break`] ends with
+    /// [`Error::Cancelled`].
     pub fn new(observe: impl Fn(usize) -> ControlFlow<()> + Send + Sync + 'static) -> Self {
         Self(Some(Arc::new(observe)))
     }
@@ -66,7 +69,8 @@ impl<'a> Watch<'a> {
         Self { observer, evaluations: Cell::new(0) }
     }
 
-    /// To be called before each evaluation.
+    /// Counts one evaluation and calls the observer; every evaluation must be preceded by this call. The
+    /// error is [`Error::Cancelled`] where the observer stops the search.
     pub(crate) fn evaluation(&self) -> Result<()> {
         self.evaluations.set(self.evaluations.get() + 1);
         match &self.observer.0 {

@@ -1,27 +1,29 @@
-//! What a search for hyper-parameters is told, and what it says.
+//! The rule for the noise variance of a fit, and the report of its search.
 
 use serde::{Deserialize, Serialize};
 
-/// What to do with the noise variance.
+/// The rule for the noise variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Noise {
-    /// Found together with the other hyper-parameters.
+    /// The noise variance is optimised together with the other hyper-parameters.
     #[default]
     Optimized,
-    /// Held at this value, in squared target units.
+    /// The noise variance is held at this value, in squared target units.
     Fixed(f64),
 }
 
-/// How a search for hyper-parameters went.
+/// The outcome of a search for hyper-parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitReport {
-    /// Log marginal likelihood at the result, summed over the channels.
+    /// Log marginal likelihood at the hyper-parameters that were found, summed over the channels. For a
+    /// compressed table it is the variational bound.
     pub log_marginal_likelihood: f64,
-    /// Evaluations of likelihood and gradient.
+    /// Number of evaluations of the likelihood and its gradient; for a compressed table, of regressions
+    /// solved.
     pub evaluations: usize,
-    /// Whether the search ended by its tolerances.
+    /// Whether the search ended because it reached one of its tolerances.
     pub converged: bool,
-    /// Hyper-parameters that ended at a bound of their range.
+    /// Names of the hyper-parameters that ended at a bound of their range.
     pub at_bound: Vec<String>,
 }

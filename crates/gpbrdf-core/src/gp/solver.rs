@@ -1,4 +1,4 @@
-//! Which solvers there are, and which one a fit takes. A new one is entered here.
+//! The list of solvers, and the choice of one for a fit. A new solver is registered here.
 
 use std::sync::Arc;
 
@@ -14,17 +14,17 @@ use crate::gp::problem::{Fitted, Problem};
 use crate::gp::tensors::TensorReader;
 use crate::gp::{dense, inducing, lattice};
 
-/// Which exact solver to use.
+/// The exact solver that a fit uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Solver {
-    /// The lattice solver where the samples stand on a lattice, else the dense one.
+    /// The lattice solver for samples that lie on a lattice, else the dense solver.
     #[default]
     Auto,
-    /// Kronecker algebra on a lattice, milliseconds.
+    /// Kronecker algebra, for samples that lie on a lattice; conditioning takes milliseconds.
     Lattice,
-    /// Cholesky on any points, `O(n^3)`.
+    /// Cholesky factorisation, for samples at any directions; conditioning takes `O(n^3)`.
     Dense,
 }
 
@@ -32,7 +32,7 @@ impl Solver {
     /// The names in files and on the command line.
     pub const NAMES: [&'static str; 3] = ["auto", "lattice", "dense"];
 
-    /// The solver that samples get: on a lattice or on any points.
+    /// Replaces [`Solver::Auto`] by the solver for samples on a lattice or off it.
     #[must_use]
     pub fn resolve(self, on_lattice: bool) -> Self {
         match self {
@@ -45,7 +45,7 @@ impl Solver {
 
 #[cfg(feature = "fit")]
 impl Solver {
-    /// Finds hyper-parameters and conditions.
+    /// Finds hyper-parameters and conditions the process at them.
     pub(crate) fn fit(self, problem: &Problem<'_>) -> Result<Fitted> {
         match self.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::fit(problem),
@@ -53,7 +53,8 @@ impl Solver {
         }
     }
 
-    /// Conditions at known hyper-parameters; the second value is the log marginal likelihood there.
+    /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood
+    /// there.
     pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
         match hyper.solver.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::condition(problem, hyper),
@@ -62,7 +63,7 @@ impl Solver {
     }
 }
 
-/// Reads a posterior that the solver of this name has saved.
+/// Reads a posterior that the solver with this name has saved.
 pub(crate) fn load(solver: &str, header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
     match solver {
         lattice::posterior::NAME => lattice::posterior::load(header, tensors),

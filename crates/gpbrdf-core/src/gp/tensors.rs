@@ -1,15 +1,17 @@
-//! Tensors of a model file, as a posterior writes and reads them.
+//! The tensors of a model file, written and read by posteriors.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use safetensors::SafeTensorError;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde_json::Value;
 
 use crate::base::error::{Error, Result};
 use crate::base::f16::to_half;
 
-/// Collects the tensors of all posteriors of a model; names get the number of the posterior as a prefix.
+/// Collects the tensors of all posteriors of a model. The name of each tensor is prefixed with the number of
+/// its posterior.
 #[derive(Debug, Default)]
 pub struct TensorWriter {
     tensors: BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>,
@@ -17,7 +19,7 @@ pub struct TensorWriter {
 }
 
 impl TensorWriter {
-    /// From now on names are those of the posterior of this number.
+    /// Starts the posterior with this number: all tensors that are added from now on belong to it.
     pub(crate) fn begin(&mut self, posterior: usize) {
         self.posterior = posterior;
     }
@@ -51,11 +53,26 @@ impl TensorWriter {
 ///
 /// # Errors
 /// Numbers that JSON cannot hold.
-pub(crate) fn header(header: &impl serde::Serialize) -> Result<serde_json::Value> {
-    serde_json::to_value(header).map_err(|e| Error::argument("model", "finite numbers", e))
+pub(crate) fn header(header: &impl serde::Serialize) -> Result<Value> {
+    let value = serde_json::to_value(header).map_err(|e| Error::argument("model", "finite numbers", e))?;
+    // JSON has no NaN and no infinity: they would become null, and the file could not be read.
+    if has_null(&value) {
+        Err(Error::argument("model", "finite numbers", "NaN or infinity"))
+    } else {
+        Ok(value)
+    }
 }
 
-/// The tensors of one posterior of a model file, and how to say what is wrong with it.
+fn has_null(value: &Value) -> bool {
+    match value {
+        Value::Null => true,
+        Value::Array(values) => values.iter().any(has_null),
+        Value::Object(values) => values.values().any(has_null),
+        _ => false,
+    }
+}
+
+/// The tensors of one posterior of a model file. Its errors name the file.
 #[derive(Clone, Copy, Debug)]
 pub struct TensorReader<'a> {
     pub(crate) tensors: &'a SafeTensors<'a>,
@@ -64,7 +81,7 @@ pub struct TensorReader<'a> {
 }
 
 impl TensorReader<'_> {
-    /// An error of this file.
+    /// An error that names this file, the content that was expected and the content that was found.
     #[must_use]
     pub fn wrong(&self, expected: impl Into<String>, found: impl Into<String>) -> Error {
         Error::Format {
@@ -75,25 +92,25 @@ impl TensorReader<'_> {
         }
     }
 
-    /// An error about the whole of what was read.
+    /// An error for values that could be read but do not make a valid posterior together.
     #[expect(clippy::needless_pass_by_value, reason = "it is handed to map_err")]
     #[must_use]
     pub fn damaged(&self, error: Error) -> Error {
         self.wrong("a consistent model", error.to_string())
     }
 
-    /// The header of a posterior.
+    /// Reads the header of a posterior from JSON.
     ///
     /// # Errors
-    /// JSON of another form.
-    pub fn header<T: serde::de::DeserializeOwned>(&self, header: serde_json::Value) -> Result<T> {
+    /// JSON that does not have the form of `T`.
+    pub fn header<T: serde::de::DeserializeOwned>(&self, header: Value) -> Result<T> {
         serde_json::from_value(header).map_err(|e| self.wrong("metadata of a model", e.to_string()))
     }
 
-    /// The values of a tensor, all of them finite.
+    /// Reads the values of a tensor, all of which are finite.
     ///
     /// # Errors
-    /// A tensor that is not there, has another type or holds a number that is not finite.
+    /// A tensor that is missing, is neither f64 nor f16, or holds a number that is not finite.
     pub fn read(&self, name: &str) -> Result<Vec<f64>> {
         let name = format!("{}.{name}", self.posterior);
         let tensor = self
@@ -119,6 +136,19 @@ impl TensorReader<'_> {
                 Err(self
                     .wrong(format!("finite numbers in tensor \"{name}\""), format!("{} at {i}", values[i])))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_json_cannot_hold_are_refused() {
+        assert!(header(&[1.0, 2.0]).is_ok());
+        for bad in [f64::NAN, f64::INFINITY] {
+            assert!(header(&[1.0, bad]).is_err(), "{bad}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! From a model to a whole table of mean and sigma.
+//! Baking: the evaluation of a model into tables of its mean and its sigma.
 
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
@@ -8,8 +8,9 @@ use crate::gp::MeanTable;
 use crate::model::{Intervals, Model};
 use crate::sample::Transform;
 
-/// Evaluates the predictive mean of a model at the centre of all 1,458,000 cells, in parallel, and carries it back to
-/// sr^-1. Cells below the horizon hold the value at the horizon, so that texture filtering shows no dark fringe.
+/// Evaluates the predictive mean of a model at the centre of all 1,458,000 cells, in parallel, and transforms
+/// it back to sr^-1. Cells below the horizon hold the value at the horizon, so that texture filtering shows
+/// no dark fringe.
 ///
 /// A lattice model takes tens of milliseconds; a dense one evaluates the kernel `n` times per cell.
 #[must_use]
@@ -24,8 +25,8 @@ pub fn bake_mean(model: &Model) -> BrdfTable {
 
 /// Evaluates the latent standard deviation of a model's target at the centre of every cell, in parallel.
 ///
-/// The variance of a dense model costs `n^2` per point: it is computed in the middle of every block of 3 x 3 x 3 cells and
-/// interpolated between.
+/// The variance of a dense model costs `n^2` per point. It is therefore computed in the middle of every block
+/// of 3 x 3 x 3 cells and interpolated between them.
 ///
 /// # Errors
 /// A covariance that cannot be factorised or does not fit in memory.
@@ -40,7 +41,7 @@ pub fn bake_sigma(model: &Model) -> Result<SigmaTable> {
     SigmaTable::from_planes(planes)
 }
 
-/// A model on the whole table: what a renderer looks up, and how sure it is.
+/// A model evaluated on the whole table: the mean, which a renderer looks up, and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baked {
     /// Predictive mean, sr^-1.
@@ -49,12 +50,12 @@ pub struct Baked {
     pub sigma: SigmaTable,
     /// Noise variance of each channel, in squared target units.
     pub noise_variances: Rgb,
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
 }
 
 impl Baked {
-    /// Bakes mean and sigma.
+    /// Bakes the mean and the sigma of a model.
     ///
     /// # Errors
     /// Those of [`bake_sigma`].
@@ -92,7 +93,7 @@ mod tests {
         fit(&samples, &options).unwrap().model
     }
 
-    /// Cells of every region, below the horizon too.
+    /// Cells of every region of the table, including some below the horizon.
     fn cells() -> impl Iterator<Item = usize> {
         (0..N_CELLS).step_by(1237)
     }

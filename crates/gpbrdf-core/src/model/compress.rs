@@ -1,4 +1,4 @@
-//! From a whole table to a model of few numbers.
+//! Compression of a whole table into a model that stores few numbers.
 
 use std::sync::Arc;
 
@@ -14,21 +14,22 @@ use crate::model::{Fit, Model};
 use crate::sample::target::Transform;
 use crate::sample::{MeanFunction, Provenance, SampleLayout, Symmetry};
 
-/// How many numbers a model may store.
+/// The count of numbers that a compressed model stores.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InducingSize {
     /// One lattice shape for all three components.
     Shape([usize; 3]),
-    /// At most so many numbers in all: node values, colour matrix, prior means, densities and hyper-parameters. The
-    /// shapes are found.
+    /// At most this many numbers in all: node values, colour matrix, prior means, densities and
+    /// hyper-parameters. The shapes of the lattices are searched.
     Floats(usize),
 }
 
-/// What a cell's error counts for.
+/// Weights of table cells in the objective of the compression.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellWeights {
-    /// The share of the weight that goes by how much a cell shows in pictures: its measure in pairs of directions times
-    /// its brightness. The rest goes evenly to all cells, save grazing ones. 0 to 1.
+    /// The share of the total weight, 0 to 1, that is distributed by how much a cell shows in pictures: its
+    /// measure in pairs of directions times its brightness. The rest is distributed evenly over all cells
+    /// except grazing ones, which get less.
     pub picture: f64,
 }
 
@@ -38,25 +39,25 @@ impl Default for CellWeights {
     }
 }
 
-/// How to compress a table.
+/// Options of [`compress`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompressOptions {
-    /// Numbers stored.
+    /// The count of numbers that the model stores.
     pub size: InducingSize,
     /// Symmetry in `phi_d` that the model relies on.
     pub symmetry: Symmetry,
     /// Shape of the kernel along each axis.
     pub kernel: Shape,
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
-    /// What cells count for.
+    /// Weights of the table's cells.
     pub weights: CellWeights,
-    /// Whether colours are decorrelated first; else each channel has a lattice.
+    /// Whether colours are decorrelated first. Otherwise each component is one of the channels.
     pub decorrelate: bool,
 }
 
 impl Default for CompressOptions {
-    /// 675 floats, as many as a Neural BRDF has (A. Sztrajman et al. 2021).
+    /// A budget of 675 floats, as many as a Neural BRDF has (A. Sztrajman et al. 2021).
     fn default() -> Self {
         Self {
             size: InducingSize::Floats(675),
@@ -69,14 +70,16 @@ impl Default for CompressOptions {
     }
 }
 
-/// Fits inducing lattices to all valid cells of a table: for compression, when the whole table is at hand.
+/// Compresses a table: fits inducing lattices to all of its valid cells. It needs the whole table; samples at
+/// few directions are fitted by [`fit`](crate::model::fit()).
 ///
-/// The targets' channels are turned into uncorrelated components, shapes and densities of their lattices are found on a
-/// thinned grid, and the values at the nodes come in closed form from all cells. Values are rounded to half precision.
-/// Seconds, whatever the table. One report for all components, with the variational bound.
+/// The channels of the targets are transformed into uncorrelated components. Shapes and densities of their
+/// lattices are searched on a thinned grid, and the values at the nodes follow in closed form from all cells.
+/// Values are rounded to half precision. Every table takes seconds. There is one report for all components,
+/// whose log marginal likelihood is the variational bound.
 ///
 /// # Errors
-/// A table without data or with values that are not finite, broken options, or a size out of range.
+/// A table without data or with values that are not finite, invalid options, or a size out of range.
 pub fn compress(table: &BrdfTable, options: &CompressOptions, origin: Provenance) -> Result<Fit> {
     let (gp, offsets, report) = inducing_lattices(table, options)?;
     let origin = Provenance { layout: SampleLayout::Table, lattice: None, ..origin };
@@ -84,7 +87,7 @@ pub fn compress(table: &BrdfTable, options: &CompressOptions, origin: Provenance
     Ok(Fit { model, reports: vec![report] })
 }
 
-/// The process of a compressed table, its prior means, and how the search went.
+/// The process of a compressed table, its prior means, and the report of the search.
 fn inducing_lattices(
     table: &BrdfTable,
     options: &CompressOptions,
@@ -117,8 +120,8 @@ fn inducing_lattices(
     Ok((gp, offsets, report))
 }
 
-/// Weighted means of the channels, and the eigenvectors of their weighted covariance as columns, the largest first; the
-/// unit matrix where colours stay as they are.
+/// Weighted means of the channels, and the eigenvectors of their weighted covariance as columns, that of the
+/// largest eigenvalue first. Without `decorrelate`, the columns are those of the identity matrix.
 fn principal_colours(grid: &CellGrid, decorrelate: bool) -> ([f64; 3], [[f64; 3]; 3]) {
     let total: f64 = grid.weights.iter().sum();
     let mean = |x: &[f64]| x.iter().zip(&grid.weights).map(|(x, w)| w * x).sum::<f64>() / total;
@@ -137,7 +140,8 @@ fn principal_colours(grid: &CellGrid, decorrelate: bool) -> ([f64; 3], [[f64; 3]
     (offsets, mix)
 }
 
-/// The grid's targets as components: `mix^T (target - offset)`, as `mix` is orthogonal.
+/// The grid's targets as components: `mix^T (target - offset)`, because the inverse of the orthogonal `mix`
+/// is its transpose.
 fn components(grid: &CellGrid, offsets: [f64; 3], mix: [[f64; 3]; 3]) -> GridData {
     let component = |k: usize| {
         (0..grid.weights.len())
@@ -216,7 +220,8 @@ mod tests {
         let options = CompressOptions { size: InducingSize::Floats(300), ..CompressOptions::default() };
         let (gp, offsets, _) = inducing_lattices(&truth, &options).unwrap();
         let moved = |share: f64| {
-            // Values moved by a fraction of the spacing of halves, as rounding would.
+            // The values are moved by a fraction of the spacing of numbers in half precision, as rounding
+            // would move them.
             let components = gp.components.iter().map(|component| {
                 let values = component.values().iter().enumerate();
                 let values = values.map(|(i, x)| x * (1.0 + share * if i % 2 == 0 { 1.0 } else { -1.0 }));
@@ -240,7 +245,7 @@ mod tests {
         let options = CompressOptions { size: InducingSize::Shape([2, 2, 2]), ..CompressOptions::default() };
         let weights = CellWeights { picture: f64::NAN };
         assert!(compress(&table, &CompressOptions { weights, ..options }, Provenance::default()).is_err());
-        // Nothing to learn is no error.
+        // A table of equal cells is not an error.
         let model = compress(&table, &options, Provenance::default()).unwrap().model;
         let value = model.predict_mean(&[cell_center(5, 5, 5)])[0];
         assert!((value[1] - 0.2).abs() < 1e-3, "{value:?}");

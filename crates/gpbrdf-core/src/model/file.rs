@@ -1,10 +1,16 @@
-//! Models on disk: safetensors with everything that is not a tensor as JSON in its metadata.
+//! Models on disk: safetensors files, whose metadata holds everything that is not a tensor as JSON.
 //!
-//! The metadata entry `gpbrdf` holds provenance, transform, prior means and a header for each posterior, which names its
-//! solver; its numbers read back to the same bits. The tensors of posterior `g` have names that begin with `g.`. Those of
-//! a lattice process are `u`, `v`, `phi` (kernel coordinates of the nodes), `targets` and `weights`
-//! (`channels x A x B x C`); of a dense one `x` (`n x 3`), `targets` and `weights` (`n x channels`); of an inducing one
-//! `k.values` (`A x B x C`, f16) for each component `k`, from which nodes and weights follow. All but those are f64.
+//! The metadata entry `gpbrdf` holds provenance, transform, prior means and one header per posterior, which
+//! names its solver. Its numbers are read back to the same bits. The names of the tensors of posterior `g`
+//! begin with `g.`, followed by:
+//!
+//! - for a lattice process: `u`, `v`, `phi` (kernel coordinates of the nodes), `targets` and `weights`
+//!   (`channels x A x B x C`);
+//! - for a dense process: `x` (`n x 3`), `targets` and `weights` (`n x channels`);
+//! - for an inducing process: `k.values` (`A x B x C`) for each component `k`, from which nodes and weights
+//!   are computed.
+//!
+//! The values of an inducing process are f16, all other tensors are f64.
 
 use std::path::Path;
 
@@ -22,7 +28,7 @@ use crate::sample::{MeanFunction, Provenance, Transform};
 /// The version of the format that is written, and the only one that is read.
 const VERSION: u32 = 2;
 
-/// Everything of a model that is not a tensor.
+/// The parts of a model that are not tensors.
 #[derive(Serialize, Deserialize)]
 struct Header {
     version: u32,
@@ -34,7 +40,7 @@ struct Header {
     posteriors: Vec<PosteriorHeader>,
 }
 
-/// What one posterior has saved besides its tensors.
+/// The parts of one posterior that are not tensors.
 #[derive(Serialize, Deserialize)]
 struct PosteriorHeader {
     solver: String,
@@ -47,10 +53,11 @@ struct VersionOnly {
 }
 
 impl Model {
-    /// Writes a model file, whole or not at all.
+    /// Writes a model file. The file appears whole or not at all.
     ///
     /// # Errors
-    /// [`Error::Io`] when the file cannot be written; nothing is left then.
+    /// [`Error::Io`] when the file cannot be written, which leaves no part of it behind, and the errors of
+    /// [`Model::to_bytes`].
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
         AtomicFile::write(path.as_ref(), &self.to_bytes()?)
     }
@@ -83,8 +90,9 @@ impl Model {
         safetensors::serialize(views, Some(metadata)).map_err(|e| unwritable(&e))
     }
 
-    /// Reads a model file. Predictions of the result equal those of the model that was written, bit for bit. Nothing is
-    /// factorised: what only variances need is made when the first one is predicted.
+    /// Reads a model file. Predictions of the result equal those of the model that was written, bit for bit.
+    /// Nothing is factorised on reading: a factorisation that only variances need is computed when the first
+    /// variance is predicted.
     ///
     /// # Errors
     /// A file that cannot be read, is not a model of this version, or is damaged.
@@ -94,7 +102,7 @@ impl Model {
         Self::from_bytes(&bytes, path)
     }
 
-    /// Reads a model from the bytes of a file; `path` is for messages.
+    /// Reads a model from the bytes of a file; `path` is only used in error messages.
     ///
     /// # Errors
     /// Bytes that are not a model of this version, or are damaged.

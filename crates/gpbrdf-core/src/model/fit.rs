@@ -1,4 +1,4 @@
-//! From samples to a model.
+//! Fitting a model to samples, and conditioning one at known hyper-parameters.
 
 use crate::base::error::{Error, Result};
 use crate::gp::problem::{Problem, Watch};
@@ -7,25 +7,26 @@ use crate::kernel::Shape;
 use crate::model::Model;
 use crate::sample::{InputSpace, LatticeLayout, MeanFunction, SampleSet, Transform};
 
-/// How to fit.
+/// Options of [`fit`].
 #[derive(Clone, Debug)]
 pub struct FitOptions {
     /// The solver.
     pub solver: Solver,
-    /// Shapes of the kernel of each axis, summed. On a lattice the product over the axes is taken; the dense solver sums
-    /// kernels of the joint distance with a length scale for each axis, and takes the first axis's shapes.
+    /// For each axis, the shapes whose kernels are summed. The lattice solver takes the product of these sums
+    /// over the axes. The dense solver sums kernels of the joint distance with one length scale per axis, and
+    /// uses the shapes of the first axis only.
     pub kernel: [Vec<Shape>; 3],
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
-    /// Prior mean.
+    /// The rule for the prior mean.
     pub mean: MeanFunction,
-    /// Noise variance.
+    /// The rule for the noise variance.
     pub noise: Noise,
     /// Whether each channel gets its own hyper-parameters instead of shared ones.
     pub per_channel: bool,
-    /// Input space of samples off the lattice.
+    /// Input space for samples off a lattice; those on a lattice use its own space.
     pub space: InputSpace,
-    /// How long to search.
+    /// Settings of the search for hyper-parameters.
     pub optimize: OptimizeOptions,
     /// Called before each evaluation of the likelihood; it can cancel the fit.
     pub observer: Observer,
@@ -48,13 +49,13 @@ impl Default for FitOptions {
 }
 
 impl FitOptions {
-    /// The options with a sum of the same shapes along every axis.
+    /// These options with the sum of `shapes` as the kernel along every axis.
     #[must_use]
     pub fn with_kernel(self, shapes: &[Shape]) -> Self {
         Self { kernel: std::array::from_fn(|_| shapes.to_vec()), ..self }
     }
 
-    /// What a solver needs for one group of channels.
+    /// The input of a solver for one group of channels that share hyper-parameters.
     fn problem<'a>(
         &'a self,
         samples: &'a SampleSet,
@@ -74,16 +75,16 @@ impl FitOptions {
     }
 }
 
-/// A fitted model and how the fit went.
+/// A fitted model and the reports of its fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The model.
     pub model: Model,
-    /// One report, or one per channel where each has its own hyper-parameters.
+    /// One report for all channels, or one per channel where each has its own hyper-parameters.
     pub reports: Vec<FitReport>,
 }
 
-/// A model at given hyper-parameters.
+/// A model that was conditioned at given hyper-parameters.
 #[derive(Clone, Debug)]
 pub struct Conditioned {
     /// The model.
@@ -92,12 +93,12 @@ pub struct Conditioned {
     pub log_marginal_likelihood: f64,
 }
 
-/// Fits a model to samples: transforms them to targets, finds hyper-parameters by maximum marginal likelihood, and
-/// conditions the process.
+/// Fits a model to samples: transforms their values to targets, finds hyper-parameters by maximum marginal
+/// likelihood, and conditions the process at them.
 ///
 /// # Errors
-/// No samples, values that are not finite, broken options, the lattice solver for samples off a lattice, a dense fit that
-/// does not fit in memory, and [`Error::Cancelled`] as soon as the observer says so.
+/// No samples, values that are not finite, invalid options, the lattice solver for samples off a lattice, a
+/// dense fit that does not fit in memory, and [`Error::Cancelled`] as soon as the observer stops the search.
 pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     let (targets, offsets) = targets(samples, options)?;
     if options.kernel.iter().any(Vec::is_empty) {
@@ -114,13 +115,15 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     Ok(Fit { model, reports })
 }
 
-/// Conditions a process on samples at given hyper-parameters, which all channels share. Uses the transform, mean and space
-/// of the options; the rest is ignored.
+/// Conditions a process on samples at given hyper-parameters, which all channels share. Of the options, only
+/// `transform`, `mean` and `space` are used.
 ///
-/// On a lattice this takes milliseconds; the dense process factorises its covariance once, `O(n^3)`.
+/// On a lattice this takes milliseconds. The dense process factorises its covariance once, which takes
+/// `O(n^3)`.
 ///
 /// # Errors
-/// No samples, values that are not finite, hyper-parameters out of range, or those of a lattice for samples off a lattice.
+/// No samples, values that are not finite, hyper-parameters out of range, or hyper-parameters of a lattice
+/// process for samples off a lattice.
 pub fn condition(samples: &SampleSet, options: &FitOptions, hyper: &Hyper) -> Result<Conditioned> {
     let (targets, offsets) = targets(samples, options)?;
     let watch = Watch::new(&options.observer);
@@ -131,7 +134,7 @@ pub fn condition(samples: &SampleSet, options: &FitOptions, hyper: &Hyper) -> Re
     Ok(Conditioned { model, log_marginal_likelihood })
 }
 
-/// The targets of each channel less their prior mean, and that mean.
+/// The targets of each channel minus their prior mean, and the prior means.
 fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, [f64; 3])> {
     let n = samples.angles.len();
     if n == 0 || samples.values.len() != n {

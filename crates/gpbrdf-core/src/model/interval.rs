@@ -1,4 +1,4 @@
-//! The 95 % interval: of a prediction, and of a table of mean and sigma.
+//! 95 % intervals of predictions, and of tables of mean and sigma.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::sample::Transform;
 /// Half width of a 95 % interval in standard deviations.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// What an interval is about.
+/// The quantity that an interval covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IntervalOf {
@@ -21,14 +21,14 @@ pub enum IntervalOf {
     Latent,
 }
 
-/// Both ends of the 95 % interval about the target `g`, carried back to sr^-1: `f(g -+ 1.96 sd)`.
+/// Both ends of the 95 % interval about the target `g`, transformed back to sr^-1: `f(g -+ 1.96 sd)`.
 #[must_use]
 pub(crate) fn interval_about(transform: Transform, g: f64, standard_deviation: f64) -> (f64, f64) {
     let half = Z_95 * standard_deviation;
     (transform.inverse(g - half), transform.inverse(g + half))
 }
 
-/// The 95 % intervals of new measurements that a table of means, one of sigma and the noise stand for:
+/// The 95 % intervals of new measurements, from a table of means, a table of sigma and the noise variances:
 /// `f(g(mean) -+ 1.96 sqrt(sigma^2 + noise))`.
 #[derive(Clone, Copy, Debug)]
 pub struct Intervals<'a> {
@@ -38,7 +38,7 @@ pub struct Intervals<'a> {
     pub sigma: &'a SigmaTable,
     /// Noise variance of each channel, in squared target units.
     pub noise_variances: Rgb,
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
 }
 
@@ -61,8 +61,8 @@ impl Intervals<'_> {
     }
 }
 
-/// Both ends of the 95 % interval of a new measurement about a mean in sr^-1, with the latent standard deviation of each
-/// channel.
+/// Both ends of the 95 % interval of a new measurement about a mean in sr^-1. `sigma` is the latent standard
+/// deviation of each channel in target units.
 pub(crate) fn measurement_interval(
     transform: Transform,
     noise_variances: Rgb,

@@ -30,22 +30,22 @@ use crate::sample::{InputSpace, MeanFunction, Provenance, Transform};
 /// A fitted Gaussian-process BRDF: `f = g^-1(m + GP(wi, wo))` for each channel.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// Where it comes from.
+    /// Origin of the samples or of the table that the model was fitted to.
     pub provenance: Provenance,
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
     /// The rule for the prior mean.
     pub mean: MeanFunction,
     /// Prior mean of each channel's target.
     pub offsets: [f64; 3],
-    /// Conditioned processes, of three channels together.
+    /// The conditioned processes, which have three channels together.
     posteriors: Vec<Arc<dyn Posterior>>,
 }
 
 /// A prediction for one pair of directions, sr^-1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// The predictive mean of the target, carried back: the median of the BRDF value.
+    /// The predictive mean of the target, transformed back: the median of the BRDF value.
     pub mean: Rgb,
     /// Lower end of the 95 % interval.
     pub lower: Rgb,
@@ -54,10 +54,11 @@ pub struct Prediction {
 }
 
 impl Model {
-    /// A model of conditioned processes: one for all channels where they share hyper-parameters, else one per channel.
+    /// A model made of conditioned processes: one for all channels where they share hyper-parameters, else
+    /// one per channel.
     ///
     /// # Errors
-    /// Channels that do not add up to three.
+    /// Processes whose channels do not add up to three.
     pub fn new(
         provenance: Provenance,
         transform: Transform,
@@ -69,10 +70,13 @@ impl Model {
         if channels != 3 {
             return Err(Error::argument("channels of a model", "3", channels));
         }
+        if let Some(bad) = offsets.iter().find(|offset| !offset.is_finite()) {
+            return Err(Error::argument("prior mean", "a finite number", bad));
+        }
         Ok(Self { provenance, transform, mean, offsets, posteriors })
     }
 
-    /// The conditioned processes, each with its first channel.
+    /// The conditioned processes, each with the index of its first channel.
     pub fn posteriors(&self) -> impl Iterator<Item = (usize, &dyn Posterior)> + '_ {
         self.posteriors.iter().scan(0, |next, posterior| {
             let first = *next;
@@ -81,7 +85,8 @@ impl Model {
         })
     }
 
-    /// The first process: it tells the solver of all.
+    /// The first process. It stands for all of them in questions with one answer per model, such as the
+    /// solver.
     fn first(&self) -> &dyn Posterior {
         self.posteriors[0].as_ref()
     }
@@ -92,46 +97,48 @@ impl Model {
         self.first().solver()
     }
 
-    /// Name of the solver for people.
+    /// Name of the solver as it is shown to users.
     #[must_use]
     pub fn solver_label(&self) -> &'static str {
         self.first().label()
     }
 
-    /// From directions to the coordinates that kernels compare, of the first process.
+    /// The map from directions to the coordinates of the kernel, as the first process has it.
     #[must_use]
     pub fn space(&self) -> InputSpace {
         self.first().space()
     }
 
-    /// Name of the kernel, of the first process.
+    /// Name of the first process's kernel.
     #[must_use]
     pub fn kernel_name(&self) -> String {
         self.first().kernel_name()
     }
 
-    /// Hyper-parameters of the first process, to condition others at; `None` for a compressed table, which has no
-    /// measurements to condition on.
+    /// Hyper-parameters of the first process, with which others can be conditioned. `None` for a compressed
+    /// table, which has no measurements to condition on.
     #[must_use]
     pub fn hyper(&self) -> Option<Hyper> {
         self.first().hyper()
     }
 
-    /// The hyper-parameters as they stand in reports: an object, or `{"channels": [...]}` where channels have their own.
+    /// The hyper-parameters as JSON for reports: an object, or `{"channels": [...]}` where each channel has
+    /// its own.
     #[must_use]
     pub fn hyper_report(&self) -> Value {
         let mut all: Vec<Value> = self.posteriors.iter().map(|p| p.report()).collect();
         if all.len() == 1 { all.swap_remove(0) } else { json!({ "channels": all }) }
     }
 
-    /// Number of measured directions; of a compressed table, its valid cells.
+    /// Number of measured directions; for a compressed table, the number of its valid cells.
     #[must_use]
     pub fn n_samples(&self) -> usize {
         self.first().n_data()
     }
 
-    /// Numbers that the model stores, another size than the number of samples: values or weights of all channels,
-    /// positions of nodes or samples, prior means, colour matrix, densities and hyper-parameters.
+    /// The count of numbers that the model stores, which is not the number of samples: values or weights of
+    /// all channels, positions of nodes or samples, prior means, colour matrix, densities and
+    /// hyper-parameters.
     #[must_use]
     pub fn n_floats(&self) -> usize {
         self.offsets.len() + self.posteriors.iter().map(|p| p.n_floats()).sum::<usize>()
@@ -147,8 +154,8 @@ impl Model {
         out
     }
 
-    /// The predictive mean of the target at each pair of directions, prior mean included. Angles that are not finite
-    /// give NaN.
+    /// The predictive mean of the target at each pair of directions, prior mean included. Angles that are not
+    /// finite give NaN.
     #[must_use]
     pub fn predict_target(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
         let mut out = vec![self.offsets; angles.len()];
@@ -161,15 +168,16 @@ impl Model {
         out
     }
 
-    /// The predictive mean, carried back to sr^-1: one evaluation of the kernel per sample for a dense model, as many
-    /// multiply-adds for a lattice one.
+    /// The predictive mean of the target at each pair of directions, transformed back to sr^-1. Per
+    /// direction, a dense model takes one kernel evaluation per sample, a lattice model one multiply-add per
+    /// node.
     #[must_use]
     pub fn predict_mean(&self, angles: &[HalfDiff]) -> Vec<Rgb> {
         self.predict_target(angles).into_iter().map(|g| g.map(|g| self.transform.inverse(g))).collect()
     }
 
-    /// Variance of the target at each pair of directions, for each channel. The first call on a loaded model may
-    /// factorise what only variances need.
+    /// Variance of the target at each pair of directions, for each channel. The first call on a loaded model
+    /// may factorise a covariance that only variances need.
     ///
     /// # Errors
     /// Angles that are not finite, or a covariance that cannot be factorised or does not fit in memory.
@@ -194,15 +202,15 @@ impl Model {
         Ok(out)
     }
 
-    /// Both ends of the 95 % interval of a new measurement about a predictive mean in sr^-1, with the latent standard
-    /// deviation of each channel in target units.
+    /// Both ends of the 95 % interval of a new measurement about a predictive mean in sr^-1, with the latent
+    /// standard deviation of each channel in target units.
     #[must_use]
     pub fn interval_about(&self, mean: Rgb, sigma: Rgb) -> (Rgb, Rgb) {
         interval::measurement_interval(self.transform, self.noise_variances(), mean, sigma)
     }
 
-    /// Mean and 95 % interval at each pair of directions: the interval of the target, carried back, so it is
-    /// asymmetric about the mean and never negative.
+    /// Mean and 95 % interval at each pair of directions. The interval of the target is transformed back, so
+    /// it is asymmetric about the mean and never negative.
     ///
     /// # Errors
     /// Those of [`Model::predict_variance`].
@@ -219,8 +227,8 @@ impl Model {
     }
 }
 
-/// Evaluates the predictive mean. One direction at a time this allocates: evaluate many by [`Brdf::eval_many`], or bake
-/// the model and look up its table.
+/// Evaluates the predictive mean. Every call allocates memory, so many directions are better evaluated by one
+/// call of [`Brdf::eval_many`], or by baking the model and looking up its table.
 impl Brdf for Model {
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
         if wi.z <= 0.0 || wo.z <= 0.0 {

@@ -1,6 +1,8 @@
-//! Models that are loaded from files written by hand, against the posterior written out with dense matrices.
+//! Tests of models that are loaded from files written by hand, against the posterior written out with dense
+//! matrices.
 //!
-//! The tests run with every set of features: with `fit` faer predicts, without it nalgebra.
+//! The tests run with every set of features: with `fit`, predictions are computed by faer, without it by
+//! nalgebra.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -31,7 +33,7 @@ fn load(solver: &str, process: &Value, tensors: &TensorWriter) -> Model {
     Model::from_bytes(&bytes, "model.safetensors").unwrap()
 }
 
-/// Directions everywhere, on nodes and below the horizon too.
+/// Directions spread over all angles, including some below the horizon.
 fn directions() -> Vec<HalfDiff> {
     let spread = |i: u32, ratio: f64| (f64::from(i) * ratio).fract();
     (0..200)
@@ -47,7 +49,8 @@ fn close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{found:e} {expected:e}");
 }
 
-/// Compares predictions and tables with targets and latent variances of each channel.
+/// Compares the predictions and the baked tables of a model with the target and the latent variance that are
+/// `expected` of each channel.
 fn check(model: &Model, expected: &dyn Fn(HalfDiff) -> (Rgb, Rgb)) {
     let angles = directions();
     let (means, variances) =
@@ -68,7 +71,7 @@ fn check(model: &Model, expected: &dyn Fn(HalfDiff) -> (Rgb, Rgb)) {
                 (f64::from(mean.values()[cell][c]) - target[c].max(0.0)).abs() < 2e-6,
                 "{cell} {target:?}"
             );
-            // A dense model's sigma is interpolated between cells.
+            // The sigma of a dense model is interpolated between cells, so it is not compared.
             if model.solver() != "dense" {
                 close(f64::from(sigma.value(cell, c)), variance[c].sqrt(), 1e-6);
             }
@@ -76,7 +79,7 @@ fn check(model: &Model, expected: &dyn Fn(HalfDiff) -> (Rgb, Rgb)) {
     }
 }
 
-/// Coordinates of the nodes of a small lattice, and targets of three channels there.
+/// The axes and the nodes of a small lattice, and the targets of three channels at its nodes.
 fn lattice() -> ([Vec<f64>; 3], Vec<[f64; 3]>, DMatrix<f64>) {
     let axes = [vec![0.05, 0.3, 0.55, 0.8, 0.97], vec![0.0, 0.35, 0.7, 0.95], vec![0.2, 0.7, 1.3]];
     let [u, v, phi] = &axes;
@@ -91,7 +94,7 @@ fn lattice() -> ([Vec<f64>; 3], Vec<[f64; 3]>, DMatrix<f64>) {
     (axes, nodes, targets)
 }
 
-/// `k_u k_v k_phi` in the box: the last axis is a mirrored circle.
+/// The product kernel `k_u k_v k_phi` of the warped box; its last axis is a mirrored circle.
 fn product_kernel(kernels: &[Kernel1d; 3], x: [f64; 3], y: [f64; 3]) -> f64 {
     let circle = |y: f64| kernels[2].value((x[2] - y).sin().abs());
     kernels[0].value((x[0] - y[0]).abs())
@@ -99,7 +102,7 @@ fn product_kernel(kernels: &[Kernel1d; 3], x: [f64; 3], y: [f64; 3]) -> f64 {
         * (circle(y[2]) + circle(-y[2]))
 }
 
-/// Mean of each column of `alpha = A^-1 y`, and `k(x, x) - k^T A^-1 k`.
+/// The posterior mean of each column of `alpha = A^-1 y`, and the posterior variance `k(x, x) - k^T A^-1 k`.
 fn posterior(prior: f64, k: &DVector<f64>, alpha: &DMatrix<f64>, inverse: &DMatrix<f64>) -> (Vec<f64>, f64) {
     (alpha.tr_mul(k).iter().copied().collect(), prior - k.dot(&(inverse * k)))
 }
@@ -187,7 +190,8 @@ fn a_loaded_compressed_table_is_the_posterior_written_out() {
         })
         .into();
     let mut tensors = TensorWriter::default();
-    // Nodes, the inverse covariance of the values, and weights, which are made with a jitter along each axis.
+    // For each component: its nodes, the inverse covariance of its values, and its weights, which are
+    // computed with a jitter along each axis.
     let mut parts = Vec::new();
     for (k, lattice) in components.iter().enumerate() {
         let [u, v, phi] = lattice.nodes();
@@ -197,7 +201,7 @@ fn a_loaded_compressed_table_is_the_posterior_written_out() {
                 v.iter().flat_map(|&v| phi.iter().map(move |&phi| [u, v, phi])).collect::<Vec<_>>()
             })
             .collect();
-        // Every value is exact in half precision.
+        // Half precision represents every value exactly.
         let values: Vec<f64> = (0..24).map(|i| ((i * 7 + k) % 13) as f64 / 8.0 - 0.75).collect();
         tensors.add_half(&format!("{k}.values"), &shape, &values);
         let n = nodes.len();
@@ -205,7 +209,7 @@ fn a_loaded_compressed_table_is_the_posterior_written_out() {
         let inverse = (covariance + DMatrix::identity(n, n) * 1e-9).try_inverse().unwrap();
         let axis = |k: usize, x: &[f64]| {
             let at = |x: f64| std::array::from_fn(|axis| if axis == k { x } else { 0.0 });
-            // At 0 the mirrored circle counts twice, the other axes once.
+            // At 0 the mirrored circle contributes a factor of 2, every other axis a factor of 1.
             let others = if k == 2 { 1.0 } else { 2.0 };
             let gram = DMatrix::from_fn(x.len(), x.len(), |i, j| {
                 product_kernel(&lattice.kernels, at(x[i]), at(x[j])) / others

@@ -1,4 +1,4 @@
-//! What a dense run will take, told before it starts.
+//! A forecast of the memory and the time of a dense fit.
 
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -7,38 +7,41 @@ use super::factor::INVERSE_COLUMNS;
 use crate::base::error::{Error, Result};
 use crate::base::linalg::factorize;
 
-/// Forecast of a dense run.
+/// The forecast for a dense fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DenseCost {
     /// Number of samples.
     pub samples: usize,
-    /// Memory in bytes: the covariance matrix, `8 n^2`, and a strip of columns a thread.
+    /// Memory in bytes: the covariance matrix, `8 n^2`, and one strip of columns per thread.
     pub bytes: f64,
-    /// Wall-clock time in seconds, for the speed measured once on a small matrix; within a factor of two or so.
+    /// Wall-clock time in seconds, from a speed that is measured once on a small matrix; it is right to
+    /// within a factor of about two.
     pub seconds: f64,
 }
 
 /// Memory and time of one fit to `samples` samples with `channels` channels after `gradient_evaluations`
 /// evaluations of the log marginal likelihood and its gradient.
 ///
-/// A fit takes `n^3 / 6` multiply-adds and `8 n^2` bytes, an evaluation with gradient `n^3 / 2`.
+/// Conditioning takes `n^3 / 6` multiply-adds and `8 n^2` bytes; each evaluation with its gradient takes
+/// `n^3 / 2` multiply-adds.
 #[must_use]
 pub fn dense_cost(samples: usize, channels: usize, gradient_evaluations: usize) -> DenseCost {
     let n = samples as f64;
     let evaluations = gradient_evaluations as f64;
     let cubic = n.powi(3) * (1.0 / 6.0 + 0.5 * evaluations) / multiply_adds_per_second();
-    // Assembly, contraction and solves: a few hundred instructions a pair.
+    // Assembly, contractions and solves take a few hundred instructions per pair of samples.
     let square = n * n * (20e-9 + 1e-9 * channels as f64) * (1.0 + evaluations);
     DenseCost { samples, bytes: bytes(samples), seconds: cubic + square }
 }
 
-/// Memory of one fit to `samples` samples.
+/// Memory of one fit to `samples` samples, in bytes.
 fn bytes(samples: usize) -> f64 {
     let n = samples as f64;
     8.0 * n * (n + (rayon::current_num_threads() * INVERSE_COLUMNS) as f64)
 }
 
-/// Refuses what needs more memory than is available, as [`DenseCost::check`] does, but measures the speed only then.
+/// Refuses a fit that needs more memory than is available, as [`DenseCost::check`] does. The speed of the
+/// machine, which the error message needs, is measured only in that case.
 pub(super) fn check_memory(samples: usize, channels: usize, gradient_evaluations: usize) -> Result<()> {
     if bytes(samples) <= available_bytes() {
         return Ok(());
@@ -47,10 +50,10 @@ pub(super) fn check_memory(samples: usize, channels: usize, gradient_evaluations
 }
 
 impl DenseCost {
-    /// Refuses what needs more memory than is available.
+    /// Refuses a fit that needs more memory than is available.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] with the need, the limit and the time.
+    /// [`Error::TooLarge`] with the memory that is needed, the limit and the time.
     pub fn check(&self) -> Result<()> {
         self.check_against(available_bytes())
     }
@@ -69,10 +72,10 @@ impl DenseCost {
     }
 }
 
-/// Assumed where the system does not tell: 4 GiB.
+/// Memory that is assumed to be available where the system does not report it: 4 GiB.
 const ASSUMED_BYTES: f64 = 4.0 * 1_073_741_824.0;
 
-/// Memory that can be had without swapping: `MemAvailable` of Linux, [`ASSUMED_BYTES`] elsewhere.
+/// Memory that is available without swapping, in bytes: `MemAvailable` of Linux, [`ASSUMED_BYTES`] elsewhere.
 fn available_bytes() -> f64 {
     let parse = |text: String| {
         let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?.trim();
@@ -82,8 +85,8 @@ fn available_bytes() -> f64 {
     std::fs::read_to_string("/proc/meminfo").ok().and_then(parse).unwrap_or(ASSUMED_BYTES)
 }
 
-/// Speed of the factorisation on this machine, from one matrix of 1024 rows; measured on the first call (some
-/// twenty milliseconds).
+/// Speed of the Cholesky factorisation on this machine, measured with a matrix of 1024 rows. The first call
+/// takes some twenty milliseconds; later calls return the same figure.
 fn multiply_adds_per_second() -> f64 {
     static SPEED: OnceLock<f64> = OnceLock::new();
     *SPEED.get_or_init(|| {

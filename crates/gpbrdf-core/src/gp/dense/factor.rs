@@ -1,4 +1,5 @@
-//! Cholesky factors of covariance matrices, with a jitter ladder.
+//! Cholesky factors of covariance matrices, with a ladder of jitters for those that are not positive
+//! definite.
 //!
 //! Matrices are column-major and `n x n`; only the lower triangle is written or read.
 
@@ -11,18 +12,18 @@ use crate::kernel::{Kernel, Points, RowScratch};
 /// Jitters tried in turn, relative to the mean of the diagonal.
 pub(crate) const JITTERS: [f64; 8] = [0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, LARGEST_JITTER];
 
-/// The largest jitter that is tried, as a share of the mean of the diagonal.
+/// The largest jitter that is tried, relative to the mean of the diagonal.
 pub(crate) const LARGEST_JITTER: f64 = 1e-6;
 
-/// Columns of the inverse a task forms at a time.
+/// Number of columns of the inverse that one parallel task computes.
 pub(crate) const INVERSE_COLUMNS: usize = 128;
 
-/// Columns a task assembles at a time.
+/// Number of columns that one parallel task assembles.
 const COLUMNS: usize = 16;
 
 /// Writes the lower triangle of `K + diagonal I` into `out`, column-major.
 ///
-/// Cost: one kernel evaluation a pair, in parallel.
+/// Cost: one kernel evaluation per pair of points, in parallel.
 pub(crate) fn assemble(kernel: &Kernel, points: &Points, diagonal: f64, out: &mut [f64]) {
     let n = points.len();
     out.par_chunks_mut(n * COLUMNS).enumerate().for_each_init(
@@ -36,8 +37,8 @@ pub(crate) fn assemble(kernel: &Kernel, points: &Points, diagonal: f64, out: &mu
     );
 }
 
-/// Writes the Cholesky factor of `K + (noise_variance + jitter) I` into `out` and returns the jitter, the smallest
-/// of the ladder that makes the matrix positive definite.
+/// Writes the Cholesky factor of `K + (noise_variance + jitter) I` into `out` and returns the jitter: the
+/// smallest one of the ladder that makes the matrix positive definite.
 pub(crate) fn assemble_and_factorize(
     kernel: &Kernel,
     points: &Points,

@@ -1,4 +1,4 @@
-//! Hyper-parameters of the dense process by maximum marginal likelihood.
+//! The search for the hyper-parameters of the dense process, by maximum marginal likelihood.
 
 use crate::base::error::{Error, Result};
 use crate::base::random::golden_ratio_subset;
@@ -8,35 +8,36 @@ use crate::gp::report::{FitReport, Noise};
 use crate::gp::{OptimizeOptions, Optimum, Parameter, maximize};
 use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
 
-/// A search for the hyper-parameters of a dense process with a sum of ARD kernels, one of each of `shapes`.
+/// A search for the hyper-parameters of a dense process whose kernel is a sum of ARD kernels, one for each of
+/// `shapes`.
 #[derive(Clone, Copy, Debug)]
 pub struct DenseFit<'a> {
     /// Coordinates of the samples, `n` rows of `metrics.len()`.
     pub x: &'a [f64],
-    /// `n` zero-mean values for each channel; the channels share hyper-parameters.
+    /// `n` zero-mean targets for each channel; the channels share hyper-parameters.
     pub targets: &'a [Vec<f64>],
     /// How distance is measured along each coordinate.
     pub metrics: &'a [AxisMetric],
-    /// Shapes of the kernel, summed.
+    /// Shapes of the ARD kernels that are summed.
     pub shapes: &'a [Shape],
     /// The rule for the noise variance.
     pub noise: Noise,
-    /// How long to search.
+    /// Settings of the search.
     pub options: &'a OptimizeOptions,
 }
 
 impl DenseFit<'_> {
-    /// Searches, and conditions at the result.
+    /// Finds the hyper-parameters and conditions the process at them.
     ///
-    /// The search runs over variances, length scales, mixture parameters and, with [`Noise::Optimized`], the noise
-    /// variance. It starts from the best of several optima on 160 of the samples, or from the usual start if that gets
-    /// further. One evaluation costs `n^3 / 2` multiply-adds, and there are some tens of them; see
-    /// [`dense_cost`](crate::gp::dense_cost) for a forecast. `evaluation` is called before each, and its error ends the
-    /// search.
+    /// The search runs over variances, length scales, mixture parameters and, with [`Noise::Optimized`], the
+    /// noise variance. It starts from the best of several optima for a subset of 160 samples, or from the
+    /// default start if that leads to a larger likelihood. One evaluation costs `n^3 / 2` multiply-adds, and
+    /// a search needs some tens of them; [`dense_cost`](crate::gp::dense_cost) gives a forecast. `evaluation`
+    /// is called before each evaluation of the likelihood, and an error that it returns ends the search.
     ///
     /// # Errors
-    /// Sizes that do not agree, values that are not finite, broken shapes or noise, more samples than fit in memory, and
-    /// those of `evaluation`.
+    /// Sizes that do not agree, values that are not finite, invalid shapes or noise variance, more samples
+    /// than fit in memory, and the errors of `evaluation`.
     pub fn run(&self, evaluation: &dyn Fn() -> Result<()>) -> Result<(DenseGp, FitReport)> {
         let Self { x, targets, metrics, shapes, noise, options } = *self;
         let channels = targets.len();
@@ -54,7 +55,7 @@ impl DenseFit<'_> {
         let data = Data { x, y: &y, dimension: metrics.len(), channels };
         let mut problem = Problem::new(&data, metrics, shapes, noise);
         let mut scouting = 0;
-        // A few samples tell good valleys from bad ones for next to nothing.
+        // A small subset of the samples tells good optima from bad ones at next to no cost.
         let scouts = OptimizeOptions { restarts: options.restarts.max(SCOUT_STARTS), ..*options };
         let found = if n <= SCOUTS || n <= metrics.len() {
             problem.search(&data, &scouts, evaluation)?
@@ -63,7 +64,8 @@ impl DenseFit<'_> {
             let thin = Data { x: &x, y: &y, ..data };
             let small = Problem::new(&thin, metrics, shapes, noise);
             let scout = small.search(&thin, &scouts, evaluation)?;
-            // What is best for a few may be worse for all than the usual start, so both run: to the end if that is quick.
+            // The best optimum for the subset may be a worse start for all samples than the default one, so
+            // both are tried: to the end where that is quick, else for `LAP` iterations.
             let most = if n <= FEW { u64::MAX } else { LAP };
             let lap =
                 OptimizeOptions { max_iterations: most.min(options.max_iterations), restarts: 0, ..*options };
@@ -88,16 +90,16 @@ impl DenseFit<'_> {
     }
 }
 
-/// Samples of the first search, from several starts.
+/// Number of samples in the subset that is searched first, from several starts.
 const SCOUTS: usize = 160;
 
-/// So many samples are searched in about a second.
+/// Up to this number of samples a search takes about a second, so searches from both starts run to their end.
 const FEW: usize = 1000;
 
-/// Iterations on more samples after which the better of two starts goes on alone.
+/// With more samples, the number of iterations after which only the better of the two starts continues.
 const LAP: u64 = 15;
 
-/// Starts of that search besides the usual one.
+/// Number of starts of the search on the subset, in addition to the default one.
 const SCOUT_STARTS: usize = 4;
 
 /// Samples: rows of coordinates, and values `[sample][channel]`.
@@ -110,7 +112,7 @@ struct Data<'a> {
 }
 
 impl Data<'_> {
-    /// `count` samples spread evenly over the order.
+    /// A subset of `count` samples, spread evenly over their order.
     fn thinned(&self, count: usize) -> (Vec<f64>, Vec<f64>) {
         let order = golden_ratio_subset(self.y.len() / self.channels, count);
         let pick = |of: &[f64], width: usize| {
@@ -120,7 +122,7 @@ impl Data<'_> {
     }
 }
 
-/// What is searched: a kernel's log-parameters and, where it is free, the noise variance.
+/// The parameters of a search: the kernel's and, where it is optimised, the noise variance.
 struct Problem {
     kernel: Kernel,
     noise: Noise,
@@ -178,7 +180,7 @@ impl Problem {
     }
 }
 
-/// The extent of coordinate `k`, at least a small positive number.
+/// The range that coordinate `k` of the samples covers, at least a small positive number.
 fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
     match metric {
         AxisMetric::Chord => 1.0,
@@ -194,7 +196,7 @@ fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
 fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], variance: f64) -> Kernel {
     let share = variance / shapes.len().max(1) as f64;
     let terms = shapes.iter().enumerate().map(|(i, &shape)| {
-        // Terms of one shape need different starts to become different.
+        // Terms of the same shape must start at different length scales, or they would stay equal.
         let fraction = 0.5 * 0.5f64.powi(i32::try_from(i).unwrap_or(30));
         let length_scale = extents.iter().map(|extent| fraction * extent).collect();
         KernelTerm { variance: share, body: KernelBody::Ard { shape, length_scale } }
@@ -203,7 +205,7 @@ fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], va
 }
 
 fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -> Vec<Parameter> {
-    // Below the spacing of the samples a length scale means nothing.
+    // Samples cannot tell apart length scales that are shorter than their spacing.
     let spacing = (samples as f64).powf(-1.0 / extents.len().max(1) as f64).min(0.5);
     let kinds = kernel.parameter_kinds().into_iter();
     kinds
@@ -225,7 +227,7 @@ fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -
 mod tests {
     use super::*;
 
-    /// A smooth function of two coordinates with noise of a known size, on a quasi-random set.
+    /// A smooth function of two coordinates at pseudo-random points, with noise of standard deviation 0.05.
     fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
         let mut random = crate::base::random::SplitMix64::new(2);
         let x: Vec<f64> = (0..2 * n).map(|_| random.next_unit()).collect();

@@ -1,4 +1,4 @@
-//! The inverse of a covariance matrix, a block of columns at a time.
+//! The inverse of a covariance matrix, one block of columns at a time.
 //!
 //! Matrices are column-major and `n x n`; only the lower triangle is read.
 
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::factor::INVERSE_COLUMNS;
 
 /// Writes columns `first..first + width` of `L^-1`, from row `first` on, into `out`: column-major,
-/// `(n - first) x width`. What stands above is zero.
+/// `(n - first) x width`. The rows above are zero and are not written.
 ///
 /// Cost: `(n - first)^2 width / 2` multiply-adds, in the calling thread.
 pub(crate) fn inverse_factor_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
@@ -29,9 +29,9 @@ pub(crate) fn inverse_factor_columns(factor: &[f64], n: usize, first: usize, wid
 /// Writes columns `first..first + width` of `(L L^T)^-1`, from row `first` on, into `out`, shaped as in
 /// [`inverse_factor_columns`].
 ///
-/// Solving with `L^T` upwards, the rows from `first` on need no row above. Cost: `(n - first)^2 width` multiply-adds,
-/// in the calling thread; `n^3 / 3` over all columns, as by way of the whole `L^-1`, but without a second matrix and
-/// with nothing to wait for between the blocks.
+/// Back substitution with `L^T` proceeds upwards, so the rows from `first` on do not need any row above.
+/// Cost: `(n - first)^2 width` multiply-adds, in the calling thread. Over all columns this is `n^3 / 3`, as
+/// much as by way of the whole `L^-1`, but it needs no second matrix, and no block has to wait for another.
 pub(crate) fn inverse_columns(factor: &[f64], n: usize, first: usize, width: usize, out: &mut [f64]) {
     inverse_factor_columns(factor, n, first, width, out);
     let rows = n - first;
@@ -40,7 +40,8 @@ pub(crate) fn inverse_columns(factor: &[f64], n: usize, first: usize, width: usi
     solve_upper_triangular_in_place(factor.transpose(), out, Par::Seq);
 }
 
-/// The blocks of [`INVERSE_COLUMNS`] columns of `n`: first column and width.
+/// Splits `n` columns into blocks of [`INVERSE_COLUMNS`]. Each item is the first column and the width of a
+/// block.
 pub(crate) fn inverse_blocks(n: usize) -> impl IndexedParallelIterator<Item = (usize, usize)> {
     let block = move |b| (b * INVERSE_COLUMNS, INVERSE_COLUMNS.min(n - b * INVERSE_COLUMNS));
     (0..n.div_ceil(INVERSE_COLUMNS)).into_par_iter().with_max_len(1).map(block)

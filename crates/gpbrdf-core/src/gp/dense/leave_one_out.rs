@@ -1,4 +1,4 @@
-//! Every sample of a dense process predicted from all others.
+//! Leave-one-out prediction: every sample of a dense process is predicted from all others.
 
 use std::f64::consts::TAU;
 
@@ -10,25 +10,29 @@ use super::inverse::{inverse_blocks, inverse_factor_columns};
 use crate::base::error::Result;
 use crate::base::simd::dot;
 
-/// What the samples say about each other.
+/// The predictions of every sample from all others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeaveOneOut {
-    /// `y_i - mu_i`, the target less its mean predicted from all other samples; `n` rows of one value a channel.
+    /// `y_i - mu_i`: the target minus the mean that is predicted from all other samples; `n` rows with one
+    /// value per channel.
     pub residuals: Vec<f64>,
-    /// Variance of that prediction, noise included; one a sample, shared by the channels.
+    /// Variance of that prediction, noise included; one value per sample, shared by the channels.
     pub variances: Vec<f64>,
     /// `sum_i ln p(y_i | all others)` in nats, over samples and channels.
     pub log_predictive_density: f64,
 }
 
 impl DenseGp {
-    /// Every sample predicted from all others, without refitting.
+    /// Predicts every sample from all others at the same hyper-parameters, without conditioning the process
+    /// anew.
     ///
-    /// `sigma_i^2 = 1 / [K^-1]_ii`, `mu_i = y_i - alpha_i sigma_i^2`. Source: C. E. Rasmussen and C. K. I. Williams,
-    /// "Gaussian Processes for Machine Learning" (2006), eqs. 5.10 to 5.12. Cost: `n^3 / 6` multiply-adds.
+    /// `sigma_i^2 = 1 / [K^-1]_ii`, `mu_i = y_i - alpha_i sigma_i^2`. Source: C. E. Rasmussen and C. K. I.
+    /// Williams, "Gaussian Processes for Machine Learning" (2006), eqs. 5.10 to 5.12. Cost: `n^3 / 6`
+    /// multiply-adds.
     ///
     /// # Errors
-    /// A process from a file whose covariance cannot be factorised.
+    /// A process that was loaded from a file and whose covariance cannot be factorised or does not fit in
+    /// memory.
     pub fn leave_one_out(&self) -> Result<LeaveOneOut> {
         let n = self.points.len();
         let factor = self.factor()?;

@@ -16,32 +16,35 @@ use crate::kernel::{GradientScratch, Kernel, Points};
 pub struct DenseLikelihood {
     /// `ln p(y | x)` in nats; the paper's eq. 16.
     pub log_marginal_likelihood: f64,
-    /// Its derivatives by the kernel's log-parameters ([`Kernel::log_parameters`]) and, last, by
-    /// `ln noise_variance`; the paper's eq. 17. Empty where it was not asked for. The jitter counts as constant.
+    /// Its derivatives with respect to the kernel's log-parameters ([`Kernel::log_parameters`]) and, last, to
+    /// `ln noise_variance`; the paper's eq. 17. Empty where only the value was computed. The jitter is
+    /// treated as a constant.
     pub gradient: Vec<f64>,
-    /// Added to the diagonal to make the matrix positive definite, in the unit of the variances; 0 where none was
-    /// needed.
+    /// The jitter that was added to the diagonal to make the matrix positive definite, in the unit of the
+    /// variances; 0 where none was needed.
     pub jitter: f64,
 }
 
-/// Samples with the working matrix of the likelihood, for many evaluations at changing hyper-parameters.
+/// Samples and a matrix to work in, for many evaluations of the likelihood at different hyper-parameters.
 ///
-/// Memory: `8 n^2` bytes, and `1024 n` a thread for a gradient.
+/// Memory: `8 n^2` bytes, and for a gradient `1024 n` bytes per thread.
 #[derive(Debug)]
 pub struct DenseEvaluator {
     x: Vec<f64>,
     dimension: usize,
-    /// Column-major, one column a channel.
+    /// The targets, column-major with one column per channel.
     y: Vec<f64>,
     matrix: Vec<f64>,
 }
 
 impl DenseEvaluator {
-    /// Takes `x`, `n` rows of `dimension` coordinates, and `y`, `n` rows of `channels` targets of zero mean.
+    /// Prepares evaluations for samples: `x` has `n` rows of `dimension` coordinates, and `y` has `n` rows of
+    /// `channels` targets of zero mean.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for sizes that do not agree, no samples, or values
-    /// that are not finite; [`Error::TooLarge`](crate::Error::TooLarge) where the matrix does not fit in memory.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for sizes that do not agree, no samples, or
+    /// values that are not finite; [`Error::TooLarge`](crate::Error::TooLarge) where the matrix does not fit
+    /// in memory.
     pub fn new(x: &[f64], dimension: usize, y: &[f64], channels: usize) -> Result<Self> {
         let y = check_samples(x, dimension, y, channels)?;
         let n = y.len() / channels;
@@ -49,8 +52,8 @@ impl DenseEvaluator {
         Ok(Self { x: x.to_vec(), dimension, y, matrix: vec![0.0; n * n] })
     }
 
-    /// The lower triangle of `K + noise_variance I`, column-major, `n x n`; what stands above the diagonal means
-    /// nothing.
+    /// The lower triangle of `K + noise_variance I`, column-major, `n x n`. Entries above the diagonal have
+    /// no meaning.
     ///
     /// Cost: `n^2 / 2` kernel evaluations, in parallel.
     ///
@@ -63,7 +66,7 @@ impl DenseEvaluator {
         Ok(&self.matrix)
     }
 
-    /// The log marginal likelihood at the kernel's hyper-parameters, without gradient.
+    /// Evaluates the log marginal likelihood at the kernel's hyper-parameters, without its gradient.
     ///
     /// Cost: `n^3 / 6` multiply-adds.
     ///
@@ -74,13 +77,14 @@ impl DenseEvaluator {
         self.factorized(kernel, noise_variance).map(|factorized| factorized.likelihood)
     }
 
-    /// The log marginal likelihood and its gradient,
+    /// Evaluates the log marginal likelihood and its gradient,
     /// `1/2 sum_c tr((alpha_c alpha_c^T - K^-1) dK/dp)` with `alpha_c = K^-1 y_c`.
     ///
-    /// Neither the inverse nor the derivatives of the matrix are ever kept whole. Cost: `n^3 / 2` multiply-adds.
+    /// Neither the inverse nor the derivatives of the matrix are ever stored as a whole. Cost: `n^3 / 2`
+    /// multiply-adds.
     ///
     /// # Errors
-    /// As [`DenseEvaluator::evaluate`].
+    /// Those of [`DenseEvaluator::evaluate`].
     pub fn evaluate_with_gradient(
         &mut self,
         kernel: &Kernel,
@@ -89,8 +93,9 @@ impl DenseEvaluator {
         let Factorized { mut likelihood, points, alpha } = self.factorized(kernel, noise_variance)?;
         let n = points.len();
         let channels = self.y.len() / n;
-        // Column by column of the lower triangle; each pair off the diagonal stands for two, so the factor 1/2
-        // applies to the diagonal only. The partial sums are added up in the order of the columns.
+        // The sum runs over the columns of the lower triangle. Each entry off the diagonal stands for two, so
+        // the factor 1/2 applies to the diagonal only. Partial sums are added in the order of the columns, so
+        // the result does not depend on the number of threads.
         let n_parameters = kernel.n_parameters();
         let (factor, dimension) = (&self.matrix, self.dimension);
         let partial: Vec<Vec<f64>> = inverse_blocks(n)
@@ -122,7 +127,7 @@ impl DenseEvaluator {
         Ok(likelihood)
     }
 
-    /// Leaves the Cholesky factor in `self.matrix`.
+    /// Evaluates the likelihood without its gradient, and leaves the Cholesky factor in `self.matrix`.
     fn factorized(&mut self, kernel: &Kernel, noise_variance: f64) -> Result<Factorized> {
         check_kernel(kernel, self.dimension, noise_variance)?;
         let points = Points::new(&self.x, &kernel.metric);
@@ -135,7 +140,7 @@ impl DenseEvaluator {
     }
 }
 
-/// What stands beside the Cholesky factor once it is made.
+/// The results of a factorisation besides the Cholesky factor itself.
 struct Factorized {
     likelihood: DenseLikelihood,
     points: Points,

@@ -1,4 +1,4 @@
-//! The dense exact Gaussian process: any points, any kernel.
+//! The exact Gaussian process with a dense covariance matrix, for any points and any kernel.
 
 pub(crate) mod cost;
 pub(crate) mod factor;
@@ -30,10 +30,11 @@ use crate::base::linalg::{half_log_det, solve, solve_lower};
 use crate::base::simd::dot;
 use crate::kernel::{Kernel, Points, RowScratch};
 
-/// Test points a task predicts at a time.
+/// Number of test points that one parallel task predicts.
 const TEST_BLOCK: usize = 128;
 
-/// A Gaussian process conditioned on samples. Channels share kernel and noise; targets have zero mean.
+/// A Gaussian process conditioned on samples. The channels share kernel and noise variance; their targets
+/// have zero mean.
 ///
 /// Memory: `8 n^2` bytes for the Cholesky factor.
 #[derive(Clone, Debug)]
@@ -41,28 +42,32 @@ pub struct DenseGp {
     kernel: Kernel,
     noise_variance: f64,
     jitter: f64,
-    /// The inputs, row-major, as they were given.
+    /// The coordinates of the samples, row-major, as they were given.
     inputs: Vec<f64>,
     points: Points,
     channels: usize,
-    /// Column-major, one column a channel; so is `alpha = K^-1 y`.
+    /// The targets, column-major with one column per channel. The weights `alpha = K^-1 y` have the same
+    /// layout.
     y: Vec<f64>,
     alpha: Vec<f64>,
-    /// The Cholesky factor, or `None` where no jitter helps; a process that was loaded makes it when it is first needed.
+    /// The Cholesky factor, or `None` where no jitter makes the covariance positive definite. A process that
+    /// was loaded from a file computes it when it is first needed.
     factor: OnceLock<Option<Vec<f64>>>,
 }
 
 impl DenseGp {
-    /// Conditions on `x`, `n` rows of [`Kernel::dimension`] coordinates, and `y`, `n` rows of `channels` targets, at
-    /// the given hyper-parameters.
+    /// Conditions the process on samples at the given hyper-parameters. `x` has `n` rows of
+    /// [`Kernel::dimension`] coordinates, and `y` has `n` rows of `channels` targets.
     ///
-    /// `K + noise_variance I = L L^T`, `alpha = K^-1 y`; where the matrix is not positive definite in floating
-    /// point, the smallest jitter of 1e-12, 1e-11, ... 1e-6 times the mean of its diagonal that helps is added
-    /// ([`DenseGp::jitter`]). Cost: `n^3 / 6` multiply-adds.
+    /// The covariance is `K = k(X, X) + noise_variance I = L L^T`, and the weights are `alpha = K^-1 y`.
+    /// Where `K` is not positive definite in floating point, a jitter is added to its diagonal: the smallest
+    /// of 1e-12, 1e-11, ... 1e-6 times the mean of the diagonal that helps ([`DenseGp::jitter`]). Cost:
+    /// `n^3 / 6` multiply-adds.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for sizes that do not agree, no samples, values that are not finite, or an invalid
-    /// kernel or noise; [`Error::TooLarge`]; [`Error::NotPositiveDefinite`].
+    /// [`Error::InvalidArgument`] for sizes that do not agree, no samples, values that are not finite, or an
+    /// invalid kernel or noise variance; [`Error::TooLarge`] where the covariance does not fit in memory;
+    /// [`Error::NotPositiveDefinite`] where no jitter helps.
     pub fn fit_at(
         x: &[f64],
         y: &[f64],
@@ -92,11 +97,12 @@ impl DenseGp {
         })
     }
 
-    /// A process whose weights and jitter are known already, from a file: predictions of the mean use the weights as they
-    /// are, and nothing is factorised before the first variance.
+    /// A process whose weights and jitter were read from a file. Predicted means use the weights as they are,
+    /// and nothing is factorised before the first variance is predicted.
     ///
     /// # Errors
-    /// As [`DenseGp::fit_at`], save those of the factorisation; weights of the wrong number.
+    /// Those of [`DenseGp::fit_at`] except for the ones of the factorisation, and a number of weights that
+    /// differs from that of the targets.
     pub(crate) fn from_weights(
         x: &[f64],
         y: &[f64],
@@ -117,7 +123,8 @@ impl DenseGp {
         Ok(Self { kernel, noise_variance, jitter, inputs: x.to_vec(), points, channels, y, alpha, factor })
     }
 
-    /// The Cholesky factor, made when it is first needed. `n^3 / 6` multiply-adds, `8 n^2` bytes.
+    /// The Cholesky factor, computed when it is first needed. Cost: `n^3 / 6` multiply-adds and `8 n^2`
+    /// bytes.
     fn factor(&self) -> Result<&[f64]> {
         let n = self.points.len();
         if self.factor.get().is_none() {
@@ -146,13 +153,13 @@ impl DenseGp {
         &self.inputs
     }
 
-    /// Targets: `n` rows of one value a channel.
+    /// The targets, `n` rows with one value per channel.
     #[must_use]
     pub fn targets(&self) -> Vec<f64> {
         row_major(&self.y, self.channels)
     }
 
-    /// `K^-1 y`: `n` rows of one value a channel.
+    /// The weights `K^-1 y`, `n` rows with one value per channel.
     #[must_use]
     pub fn weights(&self) -> Vec<f64> {
         row_major(&self.alpha, self.channels)
@@ -164,13 +171,13 @@ impl DenseGp {
         &self.kernel
     }
 
-    /// Variance of the noise of one target.
+    /// Noise variance, in squared target units.
     #[must_use]
     pub fn noise_variance(&self) -> f64 {
         self.noise_variance
     }
 
-    /// What was added to the diagonal beside the noise; 0 where nothing was needed.
+    /// The number that was added to the diagonal in addition to the noise variance; 0 where none was needed.
     #[must_use]
     pub fn jitter(&self) -> f64 {
         self.jitter
@@ -185,14 +192,16 @@ impl DenseGp {
     /// The log marginal likelihood, summed over the channels; the paper's eq. 16.
     ///
     /// # Errors
-    /// A process from a file whose covariance cannot be factorised.
+    /// A process that was loaded from a file and whose covariance cannot be factorised or does not fit in
+    /// memory.
     pub fn log_marginal_likelihood(&self) -> Result<f64> {
         Ok(log_marginal_likelihood(&self.y, &self.alpha, self.factor()?, self.points.len()))
     }
 
-    /// Posterior mean at `x`, `m` rows of coordinates: `m` rows of one value a channel.
+    /// Posterior mean at `x`, which has `m` rows of coordinates. The result has `m` rows with one value per
+    /// channel.
     ///
-    /// `sum_i k(x, x_i) alpha_i`; the paper's eq. 12. Cost: `n` kernel evaluations a point.
+    /// Formula: `sum_i k(x, x_i) alpha_i`; the paper's eq. 12. Cost: `n` kernel evaluations per point.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for incomplete rows or values that are not finite.
@@ -201,7 +210,8 @@ impl DenseGp {
         Ok(self.mean_at(x))
     }
 
-    /// [`DenseGp::predict_mean`] at whole rows; values that are not finite give NaN.
+    /// [`DenseGp::predict_mean`] without its checks: `x` must hold whole rows, and coordinates that are not
+    /// finite give NaN.
     pub(crate) fn mean_at(&self, x: &[f64]) -> Vec<f64> {
         let test = Points::new(x, &self.kernel.metric);
         let n = self.points.len();
@@ -220,13 +230,14 @@ impl DenseGp {
         out
     }
 
-    /// Posterior variance of the noise-free function at `x`, `m` rows of coordinates: one value a row, the same for
-    /// every channel.
+    /// Posterior variance of the noise-free function at `x`, which has `m` rows of coordinates. The result
+    /// has one value per row, which all channels share.
     ///
-    /// `k(x, x) - |L^-1 k(X, x)|^2`, at least 0; the paper's eq. 13. Cost: `n^2 / 2` multiply-adds a point.
+    /// Formula: `k(x, x) - |L^-1 k(X, x)|^2`, at least 0; the paper's eq. 13. Cost: `n^2 / 2` multiply-adds
+    /// per point.
     ///
     /// # Errors
-    /// As [`DenseGp::predict_mean`].
+    /// Those of [`DenseGp::predict_mean`] and of [`DenseGp::log_marginal_likelihood`].
     pub fn predict_variance_latent(&self, x: &[f64]) -> Result<Vec<f64>> {
         check_points(x, self.kernel.dimension())?;
         let factor = self.factor()?;
@@ -250,10 +261,11 @@ impl DenseGp {
         Ok(out)
     }
 
-    /// Posterior variance of a new measurement at `x`: [`DenseGp::predict_variance_latent`] plus the noise.
+    /// Posterior variance of a new measurement at `x`: [`DenseGp::predict_variance_latent`] plus the noise
+    /// variance.
     ///
     /// # Errors
-    /// As [`DenseGp::predict_mean`].
+    /// Those of [`DenseGp::predict_variance_latent`].
     pub fn predict_variance_observed(&self, x: &[f64]) -> Result<Vec<f64>> {
         let mut variance = self.predict_variance_latent(x)?;
         variance.iter_mut().for_each(|v| *v += self.noise_variance);
@@ -267,7 +279,7 @@ fn log_marginal_likelihood(y: &[f64], alpha: &[f64], matrix: &[f64], n: usize) -
     -0.5 * dot(y, alpha) - channels * (half_log_det(matrix, n) + 0.5 * n as f64 * TAU.ln())
 }
 
-/// The targets, column-major, of samples whose sizes agree.
+/// Checks the samples and returns their targets column-major.
 fn check_samples(x: &[f64], dimension: usize, y: &[f64], channels: usize) -> Result<Vec<f64>> {
     check_points(x, dimension)?;
     let n = x.len() / dimension;
@@ -288,7 +300,7 @@ fn check_samples(x: &[f64], dimension: usize, y: &[f64], channels: usize) -> Res
     Ok(column_major(y, channels))
 }
 
-/// Rows of `channels` values as one column a channel.
+/// Turns rows of `channels` values into one column per channel.
 fn column_major(rows: &[f64], channels: usize) -> Vec<f64> {
     (0..channels).flat_map(|c| rows.iter().skip(c).step_by(channels).copied()).collect()
 }

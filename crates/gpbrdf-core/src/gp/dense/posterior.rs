@@ -25,7 +25,7 @@ pub(super) struct DensePosterior {
     pub(super) space: InputSpace,
 }
 
-/// A saved process, but for its tensors.
+/// The parts of a saved process that are not tensors.
 #[derive(Serialize, Deserialize)]
 struct Header {
     space: InputSpace,
@@ -35,7 +35,7 @@ struct Header {
     channels: usize,
 }
 
-/// Reads what [`Posterior::save`] has written.
+/// Reads a process that [`Posterior::save`] has written.
 pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
     let Header { space, kernel, noise_variance, jitter, channels } = tensors.header(header)?;
     space.validate().map_err(|e| tensors.damaged(e))?;

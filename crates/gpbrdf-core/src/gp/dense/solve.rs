@@ -1,4 +1,4 @@
-//! From samples at any directions to a posterior.
+//! Fits and conditions the dense process for samples at any directions.
 
 use std::sync::Arc;
 
@@ -12,8 +12,8 @@ use crate::gp::problem::{Fitted, Problem};
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::space::InputSpace;
 
-/// Finds hyper-parameters by maximum marginal likelihood and conditions. The first axis's shapes are those of the joint
-/// distance.
+/// Finds hyper-parameters by maximum marginal likelihood and conditions the process at them. The kernels
+/// measure the joint distance, so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     let (space, points) = inputs(problem)?;
     let search = DenseFit {
@@ -28,7 +28,7 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     Ok((Arc::new(DensePosterior { gp, space }), report))
 }
 
-/// Conditions at known hyper-parameters.
+/// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
 pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
     let (space, points) = inputs(problem)?;
     let targets = &problem.targets;
@@ -44,7 +44,8 @@ pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn
     Ok((Arc::new(DensePosterior { gp, space }), value))
 }
 
-/// The coordinates of the samples, and their space: that of the lattice, if they stand on one.
+/// The input space and the coordinates of the samples in it. Samples on a lattice use the space of the
+/// lattice.
 fn inputs(problem: &Problem<'_>) -> Result<(InputSpace, Vec<[f64; 3]>)> {
     let space = problem.lattice.map_or(problem.space, |lattice: &LatticeLayout| lattice.space().into());
     space.validate()?;

@@ -1,4 +1,5 @@
-//! The dense Gaussian process against hand computation, scikit-learn's figures and its own definition.
+//! Tests of the dense Gaussian process against hand computation, reference values of scikit-learn, and its
+//! definition.
 
 use serde_json::Value;
 
@@ -190,7 +191,7 @@ fn duplicated_points_without_noise_climb_the_jitter_ladder() {
 #[cfg(feature = "fit")]
 #[test]
 fn blocks_of_the_inverse_match_the_identity() {
-    // Three blocks, the last one narrower.
+    // Three blocks of columns, the last of which is narrower.
     let block = factor::INVERSE_COLUMNS;
     let (n, noise) = (2 * block + 44, 0.05);
     let (x, y) = samples(n, 1);
@@ -261,7 +262,7 @@ fn what_cannot_be_fitted_is_refused() {
     assert!(fit(&[0.0, 1.0], &[1.0, 1.0], 1, -0.1).is_err());
     assert!(fit(&[0.0, 1.0], &[1.0, 1.0], 1, f64::NAN).is_err());
     assert!(fit(&[0.0, 1.0], &[1.0, 1.0], 1, 0.0).is_ok());
-    // 8e12 samples squared: 73 TiB.
+    // The covariance matrix would have 9e12 entries, 65 TiB.
     let many = vec![0.5; 3_000_000];
     assert!(matches!(fit(&many, &many, 1, 0.1), Err(Error::TooLarge { samples: 3_000_000, .. })));
     let two = Kernel::ard(1.0, Shape::Matern52, &[0.5, 0.5]);

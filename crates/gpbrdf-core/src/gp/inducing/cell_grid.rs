@@ -1,9 +1,10 @@
-//! All valid cells of a table on a full grid in the warped box.
+//! All valid cells of a table, resampled on a full grid in the warped box.
 //!
-//! The columns of a table - the cells along `theta_d` of one `(i_theta_h, i_phi_d)` - end at different `theta_d_max`.
-//! Each is resampled at evenly spaced `v = theta_d / theta_d_max`, linearly in the target between its cells and with at
-//! least one point for each cell, so that a product of functions of `u`, `v` and `phi` is a product on the grid too. A
-//! point's weight is in proportion to its column's length: the weights of a column add up to its number of cells.
+//! A column of a table, the cells along `theta_d` of one `(i_theta_h, i_phi_d)`, ends at its own
+//! `theta_d_max`. Each column is therefore resampled at evenly spaced `v = theta_d / theta_d_max`, by linear
+//! interpolation of its targets and with at least one point per cell. On the resulting full grid, a product
+//! of functions of `u`, `v` and `phi` is a product as well. Other things being equal, a point's weight is
+//! proportional to the number of valid cells of its column, so resampling does not favour short columns.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -17,7 +18,8 @@ use crate::brdf::table::{BrdfTable, N_PHI_D, N_THETA_D, N_THETA_H, cell_center, 
 use crate::sample::symmetry::Symmetry;
 use crate::sample::target::Transform;
 
-/// Weights of directions under the cosine at which pictures are black fall off to this share.
+/// Weights of directions whose cosine is below [`GRAZING_COSINE`], which are black in pictures, fall off to
+/// this share towards the horizon.
 const GRAZING_SHARE: f64 = 0.02;
 
 /// Targets and weights of a table on the grid `[u][v][phi]`.
@@ -31,11 +33,11 @@ pub(crate) struct CellGrid {
     pub(crate) phi: Vec<f64>,
     /// Targets of each channel, prior mean included.
     pub(crate) targets: [Vec<f64>; 3],
-    /// How much each point counts; adds up to `cells`.
+    /// Weight of each point; the weights add up to `cells`.
     pub(crate) weights: Vec<f64>,
-    /// The part of the weights that goes by what shows in pictures.
+    /// The part of each weight that measures how much the point shows in pictures.
     pub(crate) shown: Vec<f64>,
-    /// Valid cells of the table.
+    /// Number of valid cells of the table.
     pub(crate) cells: usize,
 }
 
@@ -47,8 +49,8 @@ struct Point {
 }
 
 impl CellGrid {
-    /// Resamples a table. A share `picture` of the weight goes by how much a point shows in a picture, the rest evenly to
-    /// all cells save grazing ones.
+    /// Resamples a table. The share `picture` of the total weight is distributed by how much each point shows
+    /// in a picture, the rest evenly over all cells except grazing ones, which get less.
     ///
     /// # Errors
     /// A table without data above the horizon, or with values that are not finite.
@@ -96,7 +98,7 @@ impl CellGrid {
         Ok(grid)
     }
 
-    /// Every third `v` and every fifth `phi`: a fifteenth of the work for a search.
+    /// The grid with every third `v` and every fifth `phi`: a search on it costs a fifteenth.
     pub(crate) fn decimated(&self) -> Self {
         let (step_v, step_phi) = (3, 5);
         let thin =
@@ -123,7 +125,7 @@ impl CellGrid {
     }
 }
 
-/// The points of one column, and how many valid cells it has; no points where it has none.
+/// The points of one column, and its number of valid cells. A column without valid cells has no points.
 fn column(
     table: &BrdfTable,
     symmetry: Symmetry,
@@ -133,7 +135,7 @@ fn column(
 ) -> Result<(Vec<Point>, usize)> {
     let mirror = N_PHI_D - 1 - j;
     let sides = if symmetry == Symmetry::Bilateral { vec![j, mirror] } else { vec![j] };
-    // Position along theta_d in cells, and the mean target of both sides.
+    // Position along theta_d in units of cells, and the target averaged over the mirrored cells.
     let mut known: Vec<(f64, Rgb)> = Vec::with_capacity(N_THETA_D);
     let mut cells = 0;
     for l in 0..N_THETA_D {
@@ -184,15 +186,17 @@ fn column(
     Ok((points.collect(), cells))
 }
 
-/// 1, less towards the horizon where pictures are black and logarithmic metrics look away.
+/// The weight of a point regardless of its brightness: 1, and less near the horizon, where pictures are black
+/// and metrics leave cells out.
 fn even_weight(angles: HalfDiff) -> f64 {
     let (cos_i, cos_o) = angles.cosines();
     (cos_i.min(cos_o) / GRAZING_COSINE).clamp(GRAZING_SHARE, 1.0)
 }
 
-/// How much an error of the target shows: the measure of pairs of directions that light a surface and are seen,
-/// `cos_i cos_o sin(theta_h) sin(theta_d) cos(theta_d) u` (W. Matusik et al. 2003 for the measure of half-difference
-/// angles, `d theta_h = pi u du`), times `df / dg`: the brighter, the more.
+/// How much an error of the target shows in a picture: the measure of the pairs of light and view directions,
+/// `cos_i cos_o sin(theta_h) sin(theta_d) cos(theta_d) u` (W. Matusik et al. 2003 for the measure of
+/// half-difference angles, with `d theta_h = pi u du`), times `df / dg`, which is larger where the material
+/// is brighter.
 fn picture_weight(angles: HalfDiff, target: Rgb, transform: Transform) -> f64 {
     let (cos_i, cos_o) = angles.cosines();
     let u = (angles.theta_h / FRAC_PI_2).sqrt();
@@ -211,7 +215,7 @@ mod tests {
 
     #[test]
     fn points_hold_the_targets_and_weights_add_up() {
-        // A function of the box: linear in theta_d, so that resampling is exact between the outer cells.
+        // The table is linear in theta_d, so resampling is exact between the outermost cells of a column.
         let table = BrdfTable::from_fn(|a| [1.0 + a.theta_d, 2.0 + a.theta_h, 3.0 + a.phi_d]);
         for symmetry in [Symmetry::Bilateral, Symmetry::Reciprocal] {
             let grid = CellGrid::new(&table, symmetry, Transform::Identity, 0.5).unwrap();

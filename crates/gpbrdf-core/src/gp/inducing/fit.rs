@@ -1,9 +1,10 @@
-//! Shapes, densities and length scales of inducing lattices, and their values.
+//! The search for shapes, densities and length scales of inducing lattices, and the fit of their values.
 //!
-//! The whole table is at hand, with thousands of cells for each stored number, so nothing can be overfitted: the search
-//! minimises the weighted squared residual of the closed-form regression itself. Shapes grow greedily: the side of the
-//! component that lowers the residual most for each number more. What few numbers cannot follow leaves residuals with
-//! heavy tails, so weights are renewed as lattices grow; see [`heavy_tailed_weights`].
+//! The whole table is known, with thousands of cells for each stored number, so nothing can be overfitted:
+//! the search minimises the weighted squared residual of the closed-form regression itself. Shapes grow
+//! greedily: each step extends the axis of the component that lowers the residual most per additional node.
+//! Few numbers cannot follow every peak, which leaves residuals with heavy tails, so robust weights are
+//! computed anew as the lattices grow; see [`heavy_tailed_weights`].
 
 use rayon::prelude::*;
 
@@ -17,20 +18,21 @@ use crate::sample::lattice::PHI_DENSITY;
 use crate::sample::space::WarpedBox;
 use crate::sample::symmetry::Symmetry;
 
-/// Ratio of noise to signal variance of the regression: small against thousands of cells a node, enough to keep nodes that
-/// no cell sees from running away.
+/// Ratio of noise to signal variance in the regression. It is too small to matter where there are thousands
+/// of cells per node, and large enough to keep the values of nodes without data from running away.
 const REGRESSION_RATIO: f64 = 1e-5;
 
-/// Shapes are searched up to this many numbers; larger lattices keep the proportions found there.
+/// Shapes are searched up to this number of nodes in all; larger lattices keep the proportions found there.
 const LARGEST_SEARCH: usize = 1400;
 
-/// Weights are renewed whenever lattices have grown by this factor.
+/// The robust weights are computed anew whenever the number of nodes has grown by this factor.
 const RENEWAL: f64 = 1.6;
 
-/// Renewals of the weights of the full grid.
+/// Number of times that the robust weights of the full grid are computed anew.
 const WEIGHT_STEPS: usize = 3;
 
-/// Largest sides: half of the table's cells along each axis, and all along `theta_h`.
+/// Largest number of nodes along `u`, `v` and `phi`. For comparison, the table has 90 cells along `theta_h`,
+/// 90 along `theta_d` and 180 along `phi_d`.
 const LARGEST_SIDES: [usize; 3] = [90, 60, 30];
 
 /// Data of three components on a grid, `[u][v][phi]`.
@@ -40,12 +42,12 @@ pub(crate) struct GridData {
     pub(crate) v: Vec<f64>,
     pub(crate) phi: Vec<f64>,
     pub(crate) weights: Vec<f64>,
-    /// The part of the weights that outliers keep.
+    /// The part of each weight that outliers keep; see [`heavy_tailed_weights`].
     pub(crate) shown: Vec<f64>,
     pub(crate) components: [Vec<f64>; 3],
 }
 
-/// What a fit found for one component.
+/// The result of a fit for one component.
 #[derive(Clone, Debug)]
 pub(crate) struct InducingFit {
     pub(crate) lattice: InducingShape,
@@ -53,27 +55,29 @@ pub(crate) struct InducingFit {
     pub(crate) values: Vec<f64>,
     /// The variational bound on the log marginal likelihood.
     pub(crate) bound: f64,
-    /// Regressions solved for all components together.
+    /// Number of regressions that were solved, over all components.
     pub(crate) evaluations: usize,
 }
 
-/// The logarithms that are searched: length scales along `u`, `v`, `phi`, then density, `v_density`, tail.
+/// The logarithms of the parameters of the search: length scales along `u`, `v`, `phi`, then `density`,
+/// `v_density` and `tail`.
 type Logs = [f64; 6];
 
-/// Bounds of them, not in logarithms.
+/// Bounds of these parameters, not of their logarithms.
 const BOUNDS: [(f64, f64); 6] = [(0.05, 4.0), (0.05, 4.0), (0.1, 4.0), (0.3, 5.0), (0.2, 3.0), (0.35, 4.0)];
 
-/// Where searches start: nodes that crowd at grazing half vectors, and nodes that crowd at the specular peak.
+/// Starts of the search, not as logarithms: the first has nodes that crowd at grazing half vectors, the
+/// second has nodes that crowd at the specular peak.
 const STARTS: [[f64; 6]; 2] = [[0.3, 0.5, 0.7, 0.7, 0.6, 0.8], [0.35, 0.5, 0.7, 2.0, 0.4, 1.2]];
 
-/// One component on its way.
+/// The lattice of one component during the search.
 #[derive(Clone, Debug)]
 struct Candidate {
     component: usize,
     shape: [usize; 3],
     logs: Logs,
     residual: f64,
-    /// Nodes when the logarithms were last searched.
+    /// Number of nodes when the parameters were last searched.
     searched_at: usize,
 }
 
@@ -103,7 +107,7 @@ impl Candidate {
 /// The search on one grid.
 struct Search<'a> {
     data: &'a GridData,
-    /// The grid's weights, less where residuals were large.
+    /// The robust weights: those of the grid, reduced where residuals were large.
     weights: Vec<f64>,
     symmetry: Symmetry,
     kernel: Shape,
@@ -115,7 +119,8 @@ impl Search<'_> {
         regress_on(&lattice, self.data, &self.weights, candidate.component, REGRESSION_RATIO)
     }
 
-    /// Renews the weights by what the candidates leave; their own residuals are void after it.
+    /// Computes the robust weights anew from the candidates' residuals. This invalidates
+    /// [`Candidate::residual`], which must be recomputed before candidates are compared.
     fn renew_weights(&mut self, candidates: &[Candidate]) -> Result<()> {
         let lattices: Vec<InducingShape> =
             candidates.iter().map(|candidate| candidate.lattice(self.symmetry, self.kernel)).collect();
@@ -123,12 +128,13 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The residual, infinite where the regression fails.
+    /// The penalised squared residual of a candidate; infinity where the regression fails.
     fn residual(&self, candidate: &Candidate) -> f64 {
         self.regress(candidate).map_or(f64::INFINITY, |r| r.penalised)
     }
 
-    /// Moves along one logarithm at a time, keeping what lowers the residual; steps halve when nothing does. Deterministic.
+    /// Moves along one parameter at a time and keeps every move that lowers the residual; the step is halved
+    /// where neither direction does. Deterministic. Returns the number of regressions.
     fn refine(&self, candidate: &mut Candidate, first_step: f64, sweeps: usize) -> usize {
         let mut evaluations = 1;
         candidate.residual = self.residual(candidate);
@@ -151,7 +157,7 @@ impl Search<'_> {
                 match best {
                     Some((moved, step)) if moved.residual < candidate.residual => {
                         *candidate = moved;
-                        // Tried in this direction first next time, a little further.
+                        // The next step along this parameter goes a little further, in this direction first.
                         steps[k] = 1.3 * step;
                     }
                     _ => steps[k] *= 0.5,
@@ -164,7 +170,7 @@ impl Search<'_> {
         evaluations
     }
 
-    /// The best logarithms from all starts.
+    /// Refines the candidate from every start and keeps the best result. Returns the number of regressions.
     fn best_logs(&self, candidate: &mut Candidate, sweeps: usize) -> usize {
         let mut evaluations = 0;
         for start in STARTS {
@@ -177,7 +183,8 @@ impl Search<'_> {
         evaluations
     }
 
-    /// The best shape of as many nodes, then the best logarithms for it, from the current ones and from every start.
+    /// Searches the best shape with about as many nodes, and then its parameters, from the current ones and
+    /// from every start. Keeps the best result and returns the number of regressions.
     fn settle(&self, candidate: &mut Candidate, sweeps: usize) -> usize {
         let shapes = shapes_of(candidate.nodes());
         let logs = STARTS.map(|start| start.map(f64::ln));
@@ -207,7 +214,7 @@ impl Search<'_> {
     }
 }
 
-/// Shapes of nearly `nodes` nodes and no more.
+/// Shapes with between 85 % and 100 % of `nodes` nodes.
 fn shapes_of(nodes: usize) -> Vec<[usize; 3]> {
     let mut shapes = Vec::new();
     for b in [2, 3, 4, 5, 6, 7, 8, 10, 12, 15] {
@@ -224,7 +231,7 @@ fn shapes_of(nodes: usize) -> Vec<[usize; 3]> {
 /// A candidate and the step that led to it.
 type Step = (Candidate, f64);
 
-/// One component's regression on a lattice.
+/// Solves the regression of one component on a lattice.
 fn regress_on(
     lattice: &InducingShape,
     data: &GridData,
@@ -236,7 +243,7 @@ fn regress_on(
     regress(axes.each_ref(), weights, &data.components[component], ratio)
 }
 
-/// The cardinal functions of a lattice on the grid.
+/// The cardinal functions of a lattice at the points of the grid.
 fn cardinal_on(lattice: &InducingShape, data: &GridData) -> Result<[CardinalAxis; 3]> {
     let u: Vec<f64> = data.u.iter().map(|&u| lattice.space.warp_u(u)).collect();
     let v: Vec<f64> = data.v.iter().map(|&v| lattice.space.warp_v(v)).collect();
@@ -248,8 +255,8 @@ fn cardinal_on(lattice: &InducingShape, data: &GridData) -> Result<[CardinalAxis
     Ok([axis(0)?, axis(1)?, axis(2)?])
 }
 
-/// Adds the squared residuals of one component's values to those of the others. As colours are mixed by an orthogonal matrix,
-/// the sum of all three is that of the channels.
+/// Adds the squared residuals of one component to `squares`. Colours are mixed by an orthogonal matrix, so
+/// the sum over all three components equals the sum over the channels.
 fn add_squares(
     lattice: &InducingShape,
     values: &[f64],
@@ -265,26 +272,26 @@ fn add_squares(
     Ok(())
 }
 
-/// How large the lattices may be.
+/// The size of the lattices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Budget {
     /// One shape for all three components.
     Shape([usize; 3]),
-    /// So many numbers in all, constants included.
+    /// At most this many stored numbers in all, constants included.
     Floats(usize),
 }
 
-/// Stored with a model whatever its solver: the prior means.
+/// The count of prior means, which every model stores.
 const PRIOR_MEANS: usize = 3;
 
-/// The smallest number of floats: three lattices of the smallest shape.
+/// The smallest budget of floats: it pays for three lattices of the smallest shape.
 pub(crate) const SMALLEST_FLOATS: usize =
     (COLOUR_CONSTANTS + PRIOR_MEANS) + 3 * (COMPONENT_CONSTANTS + SMALLEST[0] * SMALLEST[1] * SMALLEST[2]);
 
-/// The shape that growth starts from.
+/// The shape from which every lattice grows.
 const SMALLEST: [usize; 3] = [4, 3, 1];
 
-/// Finds shapes, densities and length scales on `coarse`, and the values on `fine`.
+/// Finds shapes, densities and length scales on the grid `coarse`, and then the values on the grid `fine`.
 ///
 /// # Errors
 /// A shape or number of floats out of range, or regressions that cannot be solved.
@@ -310,7 +317,7 @@ pub(crate) fn fit_inducing(
         Budget::Shape(shape) => {
             check_shape(shape)?;
             for candidate in &mut candidates {
-                // A large lattice is searched at a smaller size of the same proportions.
+                // The parameters of a large lattice are searched on a smaller one of the same proportions.
                 let searched = shrink(shape, LARGEST_SEARCH / 3);
                 candidate.shape = searched;
                 evaluations += search.best_logs(candidate, 8);
@@ -343,7 +350,7 @@ pub(crate) fn fit_inducing(
     components.map(|(k, lattice)| finish(lattice, fine, &weights, k, evaluations)).collect()
 }
 
-/// Weights of the full grid, as the values that they lead to leave them.
+/// Robust weights of the full grid, by [`WEIGHT_STEPS`] reweighting steps from its own weights.
 fn renewed_weights(lattices: &[InducingShape], data: &GridData) -> Result<Vec<f64>> {
     let mut weights = data.weights.clone();
     for _ in 0..WEIGHT_STEPS {
@@ -352,7 +359,8 @@ fn renewed_weights(lattices: &[InducingShape], data: &GridData) -> Result<Vec<f6
     Ok(weights)
 }
 
-/// The grid's weights by what the values that `weights` lead to leave, on one lattice a component.
+/// One reweighting step: solves each component's regression with `weights`, and returns the grid's own
+/// weights reduced where the squared residuals are large (see [`heavy_tailed_weights`]).
 fn renewed(weights: &[f64], lattices: &[InducingShape], data: &GridData) -> Result<Vec<f64>> {
     let mut squares = vec![0.0; weights.len()];
     for (component, lattice) in lattices.iter().enumerate() {
@@ -362,7 +370,8 @@ fn renewed(weights: &[f64], lattices: &[InducingShape], data: &GridData) -> Resu
     Ok(heavy_tailed_weights(&data.weights, &data.shown, &squares))
 }
 
-/// Grows the lattices until no side more fits into `nodes` nodes in all.
+/// Grows the lattices until no further step fits within `nodes` nodes in all. Returns the number of
+/// regressions.
 ///
 /// # Errors
 /// Regressions that cannot be solved.
@@ -372,7 +381,7 @@ fn grow(search: &mut Search<'_>, candidates: &mut [Candidate], nodes: usize) -> 
         evaluations += search.settle(candidate, 3);
     }
     let mut renewed_at = 0;
-    // The gains of each component's three sides, until it changes.
+    // The possible next steps of each component. They stay valid until the component or the weights change.
     let mut options: Vec<Vec<Candidate>> = candidates.iter().map(|_| Vec::new()).collect();
     loop {
         let used: usize = candidates.iter().map(Candidate::nodes).sum();
@@ -388,7 +397,8 @@ fn grow(search: &mut Search<'_>, candidates: &mut [Candidate], nodes: usize) -> 
                 options[k].clear();
             }
             if options[k].is_empty() {
-                // By one node and by half: what a peak gains shows only once nodes are dense enough.
+                // An axis grows by one node or by half of its nodes: a narrow peak may not gain anything
+                // before nodes are dense enough to resolve it.
                 options[k] = (0..6)
                     .into_par_iter()
                     .filter(|option| candidate.shape[option / 2] < LARGEST_SIDES[option / 2])
@@ -423,7 +433,8 @@ fn grow(search: &mut Search<'_>, candidates: &mut [Candidate], nodes: usize) -> 
     Ok(evaluations)
 }
 
-/// Enlarges lattices in proportion to `nodes` nodes in all, then side by side while there is room.
+/// Enlarges the lattices in proportion to at most `nodes` nodes in all, then adds one node along one axis
+/// after another while there is room.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "sides are small and positive")]
 fn enlarge(candidates: &mut [Candidate], nodes: usize) {
     let used: usize = candidates.iter().map(Candidate::nodes).sum();
@@ -445,18 +456,20 @@ fn enlarge(candidates: &mut [Candidate], nodes: usize) {
     }
 }
 
-/// The shape of about `nodes` nodes and the same proportions, if it is smaller.
+/// A shape with the same proportions and about `nodes` nodes; the given shape if it has fewer.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "sides are small and positive")]
 fn shrink(shape: [usize; 3], nodes: usize) -> [usize; 3] {
     let scale = (nodes as f64 / shape.iter().product::<usize>() as f64).cbrt().min(1.0);
     shape.map(|side| ((side as f64 * scale).round() as usize).max(1))
 }
 
-/// Values on the full grid, and the variances that go with them.
+/// Fits the values on the full grid, and the variances that go with them.
 ///
-/// `s^2` is the scale of the values under their prior, `m^T K_ZZ^-1 m / M`, held to what would explain half of the
-/// residuals between the nodes; the noise variance is the rest. The bound is that of M. Titsias, "Variational Learning of
-/// Inducing Variables in Sparse Gaussian Processes" (2009), with the noise `noise / weight` of each point.
+/// The signal variance `s^2` is the scale of the `M` values under their prior, `m^T K_ZZ^-1 m / M`, but no
+/// larger than what would explain half of the mean squared residual as variance between the nodes. The noise
+/// variance is the remainder of that residual. The bound is that of M. Titsias, "Variational Learning of
+/// Inducing Variables in Sparse Gaussian Processes" (2009), with noise variance `noise / weight` for each
+/// point.
 fn finish(
     mut lattice: InducingShape,
     data: &GridData,
@@ -469,7 +482,7 @@ fn finish(
     let n: f64 = data.weights.iter().sum();
     let mut squares = vec![0.0; weights.len()];
     add_squares(&lattice, &values, data, component, &mut squares)?;
-    // Outliers count in the noise as much as the others.
+    // The noise variance is estimated with the grid's own weights, so outliers contribute to it in full.
     let residual = (squares.iter().zip(&data.weights).map(|(r, w)| r * w).sum::<f64>() / n).max(1e-12);
     let inverses = lattice.inverses()?;
     let solved = crate::gp::contract(inverses.each_ref().map(view), &values, 1);
@@ -499,7 +512,7 @@ fn prior_trace(lattice: &InducingShape, data: &GridData, weights: &[f64]) -> f64
         * rest
 }
 
-/// The variational bound at the lattice's own hyper-parameters.
+/// The variational bound on the log marginal likelihood at the lattice's own hyper-parameters.
 ///
 /// # Errors
 /// A regression that cannot be solved.
@@ -560,7 +573,7 @@ mod tests {
     fn the_bound_is_the_dense_one_and_stays_below_the_exact_likelihood() {
         let (data, lattice) = (data([6, 5, 4]), lattice([3, 2, 2]));
         let found = bound(&lattice, &data, &data.weights, 0).unwrap();
-        // Dense, from the definitions.
+        // The same bound with dense matrices, from its definition.
         let points = [
             data.u.iter().map(|&u| lattice.space.warp_u(u)).collect::<Vec<_>>(),
             data.v.iter().map(|&v| lattice.space.warp_v(v)).collect(),
@@ -590,7 +603,7 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 1e-5, "{found} {expected}");
         let exact = likelihood(&k_xx + &noise);
         assert!(found < exact, "{found} {exact}");
-        // More nodes come closer to it.
+        // With more nodes the bound comes closer to the exact likelihood.
         let more =
             bound(&InducingShape { shape: [5, 4, 3], ..lattice.clone() }, &data, &data.weights, 0).unwrap();
         assert!(found < more && more < exact, "{found} {more} {exact}");
@@ -621,7 +634,7 @@ mod tests {
 
     #[test]
     fn points_far_off_hardly_pull_the_values() {
-        // Less than they would with squared residuals.
+        // Robust weights are compared with plain squared residuals.
         let clean = data([12, 8, 6]);
         let mut spoilt = clean.clone();
         spoilt.components[0].iter_mut().step_by(41).for_each(|y| *y += 5.0);

@@ -1,11 +1,16 @@
-//! Weights that outliers do not rule.
+//! Robust weights, which keep outliers from dominating a least-squares fit.
 //!
-//! What a few numbers cannot follow leaves residuals with heavy tails. Under squared residuals such points decide where the
-//! numbers go, and in vain.
+//! A lattice with few nodes cannot follow every peak of a table, which leaves residuals with heavy tails. If
+//! residuals are squared, the points on such peaks decide where nodes are placed, although the nodes are too
+//! few to fit them.
 
-/// Weights of one step of expectation maximisation for residuals that follow Student's t with one degree of freedom,
-/// `w / (1 + r^2 / s^2)` (K. Lange, R. Little and J. Taylor, "Robust Statistical Modeling Using the t Distribution", 1989),
-/// with `s^2` the median of `r^2`. What shows in pictures keeps its weight, the rest adds up to what it did.
+/// Weights of one step of expectation maximisation for residuals that follow Student's t with one degree of
+/// freedom, `w / (1 + r^2 / s^2)` (K. Lange, R. Little and J. Taylor, "Robust Statistical Modeling Using the
+/// t Distribution", 1989), with `s^2` the median of the squared residuals `r^2`, which are given by
+/// `squares`.
+///
+/// `shown` is the part of each weight that is kept. The remainder is reduced as above and then rescaled so
+/// that its total is unchanged.
 pub(crate) fn heavy_tailed_weights(weights: &[f64], shown: &[f64], squares: &[f64]) -> Vec<f64> {
     let counted = squares.iter().zip(weights).filter(|(_, weight)| **weight > 0.0);
     let mut sorted: Vec<f64> = counted.map(|(square, _)| *square).collect();

@@ -1,9 +1,11 @@
-//! The inducing lattice: a sparse process whose few stored numbers are values at the nodes of a lattice.
+//! A sparse Gaussian process on inducing lattices: the few numbers that it stores are its values at lattice
+//! nodes.
 //!
-//! Three components, one for each column of a colour matrix, have a lattice each. Given its values a component is an
-//! exact lattice process without noise, so means and variances are those of [`LatticeGp`]: `k(x, Z) K_ZZ^-1 m` and
-//! `s^2 (k(x, x) - k(x, Z) K_ZZ^-1 k(Z, x))`. The variance leaves out what is not known about the values themselves;
-//! with thousands of cells to a node that is far below what lies between the nodes.
+//! There are three components, one for each column of a colour matrix, and each has its own lattice. Given
+//! the values `m` at its nodes `Z`, a component is an exact lattice process without noise, so its mean and
+//! variance are those of [`LatticeGp`]: `k(x, Z) K_ZZ^-1 m` and `s^2 (k(x, x) - k(x, Z) K_ZZ^-1 k(Z, x))`.
+//! This variance leaves out the uncertainty of the values themselves; with thousands of table cells per node,
+//! that uncertainty is far smaller than the variance between the nodes.
 
 #[cfg(feature = "fit")]
 pub(crate) mod cell_grid;
@@ -26,16 +28,16 @@ use crate::gp::lattice::{LatticeData, LatticeGp, LatticeHyper};
 use crate::kernel::Kernel1d;
 use crate::sample::space::WarpedBox;
 
-/// Shape, space and hyper-parameters of the lattice of one component: all but its values.
+/// Shape, space and hyper-parameters of the lattice of one component: everything but its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InducingShape {
-    /// Nodes along `u`, `v`, `phi`.
+    /// Number of nodes along `u`, `v`, `phi`.
     pub shape: [usize; 3],
-    /// The warped box with this component's own densities; nodes are even in its coordinates.
+    /// The warped box with this component's own densities; nodes are evenly spaced in its coordinates.
     pub space: WarpedBox,
     /// The kernel of each axis.
     pub kernels: [Kernel1d; 3],
-    /// `s^2`, in squared target units.
+    /// Signal variance `s^2`, in squared target units.
     pub signal_variance: f64,
     /// Variance of the residuals that the signal does not account for, in squared target units.
     pub noise_variance: f64,
@@ -44,8 +46,9 @@ pub struct InducingShape {
 impl InducingShape {
     /// Kernel coordinates of the nodes along the three axes.
     ///
-    /// Along `u` they go from the specular peak's first cell to `theta_h = pi/2`, along `v` from 0 to the horizon, both
-    /// ends included; along `phi` they keep half a step off the ends. A single node stands in the middle.
+    /// Along `u` the nodes reach from the centre of the table's first cell, next to the specular peak, to
+    /// `theta_h = pi/2`, and along `v` from 0 to the horizon, with nodes at both ends. Along `phi` the
+    /// outermost nodes lie half a step inside the ends. A single node is placed in the middle of its axis.
     #[must_use]
     pub fn nodes(&self) -> [Vec<f64>; 3] {
         let [a, b, c] = self.shape;
@@ -73,7 +76,7 @@ impl InducingShape {
         self.len() == 0
     }
 
-    /// The inverse covariance of the nodes of each axis.
+    /// The inverse covariance of the nodes along each axis.
     pub(super) fn inverses(&self) -> Result<[Matrix; 3]> {
         let nodes = self.nodes();
         let (metrics, mirrored) = (self.space.lattice_metrics(), self.space.mirrored());
@@ -89,13 +92,13 @@ impl InducingShape {
     }
 }
 
-/// The most nodes of one lattice: the normal matrix of more takes gigabytes.
+/// The largest number of nodes of one lattice; with more, the normal matrix would take gigabytes.
 pub(crate) const MAX_NODES: usize = 12_000;
 
-/// Checks the sides of an inducing lattice.
+/// Checks the numbers of nodes along the axes of an inducing lattice.
 ///
 /// # Errors
-/// An empty side, or more than 12,000 nodes.
+/// An axis without nodes or with more than 512, or more than 12,000 nodes in all.
 pub(crate) fn check_shape(shape: [usize; 3]) -> Result<()> {
     let nodes = shape.iter().try_fold(1usize, |n, &side| n.checked_mul(side));
     match nodes {
@@ -119,7 +122,8 @@ impl InducingComponent {
     /// The process with these values at the nodes, `[A][B][C]`.
     ///
     /// # Errors
-    /// A broken lattice, values of the wrong number or not finite.
+    /// An invalid lattice, a number of values that differs from that of the nodes, or values that are not
+    /// finite.
     pub fn new(lattice: InducingShape, values: Vec<f64>) -> Result<Self> {
         lattice.validate()?;
         let data = LatticeData {
@@ -150,40 +154,43 @@ impl InducingComponent {
         &self.lattice
     }
 
-    /// Values at the nodes, `[A][B][C]`: the numbers that are stored, each of them exact in half precision after a fit.
+    /// Values at the nodes, `[A][B][C]`. These are the numbers that are stored; after a fit, half precision
+    /// represents each of them exactly.
     #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.gp.data().targets
     }
 
-    /// The exact lattice process given the values: the component's mean and variance, with its bases and coefficients.
-    /// Its own noise variance is a jitter only.
+    /// The exact lattice process that the values define: it gives the mean and the variance of the component.
+    /// Its own noise variance is only a jitter.
     #[must_use]
     pub fn gp(&self) -> &LatticeGp {
         &self.gp
     }
 
-    /// Numbers that the component stores: values, shapes' densities, length scales and variances.
+    /// The count of numbers that the component stores: values, densities of its space, length scales and
+    /// variances.
     #[must_use]
     pub fn floats(&self) -> usize {
         self.values().len() + COMPONENT_CONSTANTS
     }
 }
 
-/// Stored with a component besides its values: three densities, three length scales, two variances.
+/// The count of numbers that a component stores besides its values: three densities, three length scales, two
+/// variances.
 pub(crate) const COMPONENT_CONSTANTS: usize = 8;
 
-/// Stored with all components: the colour matrix.
+/// The count of numbers that are stored once for all components: the colour matrix.
 pub(crate) const COLOUR_CONSTANTS: usize = 9;
 
 /// The inducing lattices of a material: `target_c = offset_c + sum_k mix_ck component_k`.
 #[derive(Clone, Debug)]
 pub struct InducingGp {
-    /// Orthogonal: column `k` is the colour of component `k`.
+    /// The orthogonal colour matrix: column `k` is the colour of component `k`.
     pub mix: [[f64; 3]; 3],
-    /// The components, that of the largest variance first.
+    /// The three components; where colours are decorrelated, the one of the largest variance comes first.
     pub components: Vec<InducingComponent>,
-    /// Cells that the values were fitted to.
+    /// Number of table cells that the values were fitted to.
     pub cells: usize,
 }
 
@@ -191,7 +198,8 @@ impl InducingGp {
     /// Checks that there are three components of one symmetry and a finite colour matrix.
     ///
     /// # Errors
-    /// Otherwise.
+    /// Another number of components, components of different symmetries, or a colour matrix that is not
+    /// finite.
     pub fn validate(&self) -> Result<()> {
         if self.components.len() != 3 {
             return Err(Error::argument("components", "3", self.components.len()));
@@ -206,12 +214,12 @@ impl InducingGp {
         }
     }
 
-    /// Colours out of components.
+    /// Mixes the values of the components into colours.
     pub(crate) fn colour(&self, components: [f64; 3]) -> [f64; 3] {
         self.mix.map(|row| row.iter().zip(components).map(|(m, x)| m * x).sum())
     }
 
-    /// Variances of colours out of independent variances of components.
+    /// The variances of the channels, given the variances of the components, which are independent.
     pub(crate) fn colour_variance(&self, components: [f64; 3]) -> [f64; 3] {
         self.mix.map(|row| row.iter().zip(components).map(|(m, x)| m * m * x).sum())
     }

@@ -4,10 +4,11 @@ use crate::base::error::{Error, Result};
 use crate::base::linalg::{Matrix, factorize, solve};
 use crate::kernel::{AxisMetric, Kernel1d};
 
-/// Added to the variance of every node, relative, against rounding in smooth kernels.
+/// The jitter that is added to the variance of every node, relative to the mean variance. It makes up for
+/// rounding errors of smooth kernels.
 pub(crate) const NODE_JITTER: f64 = 1e-9;
 
-/// Kernel values `[x][z]` of one axis; a mirrored axis has the kernel `k(x, z) + k(x, -z)`.
+/// Kernel values `[x][z]` along one axis; a mirrored axis has the kernel `k(x, z) + k(x, -z)`.
 pub(crate) fn axis_kernel(
     kernel: &Kernel1d,
     metric: AxisMetric,
@@ -31,7 +32,7 @@ pub(crate) struct NodeCovariance {
 }
 
 impl NodeCovariance {
-    /// The covariance of nodes `z`.
+    /// Computes the covariance of the nodes `z` and factorises it.
     ///
     /// # Errors
     /// Nodes whose covariance has no Cholesky factor.

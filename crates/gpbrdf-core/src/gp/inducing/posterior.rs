@@ -1,5 +1,5 @@
-//! Inducing lattices as a posterior of a model: each component is the lattice process that its values define, and colours
-//! are mixtures of the components.
+//! Inducing lattices as the posterior of a model. Each component is the lattice process that its values
+//! define, and colours are mixtures of the components.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ use crate::sample::space::InputSpace;
 /// The solver's name in files and reports.
 pub(crate) const NAME: &str = "inducing";
 
-/// A saved process, but for its values.
+/// The parts of a saved process that are not tensors.
 #[derive(Serialize, Deserialize)]
 struct Header {
     mix: [[f64; 3]; 3],
@@ -30,7 +30,7 @@ struct Header {
     components: Vec<InducingShape>,
 }
 
-/// Reads what [`Posterior::save`] has written.
+/// Reads a process that [`Posterior::save`] has written.
 pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
     let Header { mix, cells, components } = tensors.header(header)?;
     let components = components.into_iter().enumerate().map(|(k, lattice)| {
@@ -43,7 +43,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
 }
 
 impl InducingGp {
-    /// Coordinates of directions on the lattice of a component.
+    /// Coordinates of directions in the space of a component.
     fn points(component: &InducingComponent, angles: &[HalfDiff]) -> Vec<[f64; 3]> {
         let space = component.lattice().space;
         angles.iter().map(|&angles| space.coordinates(angles)).collect()
@@ -142,7 +142,8 @@ impl Posterior for InducingGp {
         DeviceForm::Separable(parts.collect())
     }
 
-    /// Components are added up in single precision, whose rounding is a tenth of a millionth of a target.
+    /// Keeps the components in single precision until they are mixed, which rounds them to about 1e-7 of
+    /// their size.
     fn bake_mean(&self, table: &mut MeanTable<'_>) {
         for (k, component) in self.components.iter().enumerate() {
             let slabs = table.cells.par_chunks_mut(SLAB);

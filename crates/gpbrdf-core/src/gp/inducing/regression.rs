@@ -1,11 +1,12 @@
-//! Weighted regression of gridded data on a lattice of inducing values, in closed form.
+//! Weighted regression of gridded data on the values of an inducing lattice, in closed form.
 //!
-//! The data are a full grid in the coordinates `(u, v, phi)` with a weight for every point, the lattice is another one
-//! with far fewer nodes `Z`, and the kernel is a product. The sparse process is the subset of regressors
-//! (J. Quiñonero-Candela and C. E. Rasmussen 2005, section 4.1) with the noise `sigma^2 / weight`:
-//! `mean(x) = k(x, Z) (rho K_ZZ + K_ZX W K_XZ)^-1 K_ZX W y` with `rho = sigma^2 / s^2`. It is solved for the values at
-//! the nodes, `m = K_ZZ w`, with the cardinal functions `Phi = K_XZ K_ZZ^-1`: `(rho K_ZZ^-1 + Phi^T W Phi) m = Phi^T W y`,
-//! which is well conditioned and gives numbers as large as the targets.
+//! The data form a full grid in the coordinates `(u, v, phi)` with a weight for every point, the lattice is a
+//! second grid with far fewer nodes `Z`, and the kernel is a product. The sparse process is the subset of
+//! regressors (J. Quiñonero-Candela and C. E. Rasmussen 2005, section 4.1) with noise variance
+//! `sigma^2 / weight`: `mean(x) = k(x, Z) (rho K_ZZ + K_ZX W K_XZ)^-1 K_ZX W y` with `rho = sigma^2 / s^2`.
+//! The system is solved for the values at the nodes, `m`, instead of the weights `K_ZZ^-1 m`. With the
+//! cardinal functions `Phi = K_XZ K_ZZ^-1` it reads `(rho K_ZZ^-1 + Phi^T W Phi) m = Phi^T W y`, which is
+//! well conditioned and gives numbers as large as the targets.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -16,7 +17,7 @@ use crate::base::linalg::{factorize, half_log_det, solve};
 use crate::gp::inducing::node_covariance::{NodeCovariance, axis_kernel};
 use crate::kernel::{AxisMetric, Kernel1d};
 
-/// The cardinal functions of one axis at the grid's points, and the covariance of its nodes.
+/// The cardinal functions along one axis at the points of the grid, and the covariance of the axis's nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct CardinalAxis {
     /// `Phi`: points x nodes.
@@ -29,7 +30,7 @@ pub(crate) struct CardinalAxis {
 }
 
 impl CardinalAxis {
-    /// The functions of nodes `z` at points `x`.
+    /// Evaluates the cardinal functions of the nodes `z` at the points `x`.
     ///
     /// # Errors
     /// Nodes whose covariance has no Cholesky factor.
@@ -57,7 +58,8 @@ impl CardinalAxis {
 pub(crate) struct Regression {
     /// Values at the nodes, `[A][B][C]`.
     pub(crate) values: Vec<f64>,
-    /// `y^T (W^-1 + Q / rho)^-1 y` with `Q = K_XZ K_ZZ^-1 K_ZX`: the weighted squared residual plus the prior's penalty.
+    /// The weighted squared residual plus the prior's penalty, `y^T (W^-1 + Q / rho)^-1 y` with
+    /// `Q = K_XZ K_ZZ^-1 K_ZX`.
     pub(crate) penalised: f64,
     /// `ln det(I + W^1/2 Q W^1/2 / rho)`.
     pub(crate) log_det: f64,
@@ -65,11 +67,12 @@ pub(crate) struct Regression {
     pub(crate) explained: f64,
 }
 
-/// `M_u (x) M_v (x) M_phi` regression with grid weights and targets, `[u][v][phi]`.
+/// Solves the regression for weights and targets on the grid, `[u][v][phi]`.
 ///
-/// The normal matrix comes out one axis at a time: pairs of functions along `phi` are summed first, then along `v`, then
-/// along `u`: `U V P C^2 + U V B^2 C^2 + U A^2 B^2 C^2` multiply-adds over 8 by symmetry, then a Cholesky factor of
-/// `(A B C)^3 / 3`.
+/// The normal matrix is summed one axis at a time: products of pairs of functions first along `phi`, then
+/// along `v`, then along `u`. For `U x V x P` points and `A x B x C` nodes this costs
+/// `U V P C^2 + U V B^2 C^2 + U A^2 B^2 C^2` multiply-adds, up to 8 times fewer by symmetry. The Cholesky
+/// factor costs `(A B C)^3 / 6`.
 ///
 /// # Errors
 /// A normal matrix without a Cholesky factor.
@@ -88,7 +91,7 @@ pub(crate) fn regress(
 
     let mut matrix = vec![0.0; m * m];
     let plane = b * c;
-    // tr(K_ZZ Phi^T W Phi), a column at a time so that the sum has one order.
+    // tr(K_ZZ Phi^T W Phi), summed column by column so that the order of the sum is fixed.
     let traces: Vec<f64> = matrix
         .par_chunks_mut(m)
         .enumerate()
@@ -108,7 +111,8 @@ pub(crate) fn regress(
         })
         .collect();
     let diagonal: f64 = matrix.iter().step_by(m + 1).sum::<f64>() / m as f64;
-    // Nodes where no data are leave rounding only: a jitter far below anything that was measured.
+    // For nodes without data the matrix holds little but rounding errors. The jitter that counters them is
+    // far below the contribution of anything that was measured.
     matrix.iter_mut().step_by(m + 1).for_each(|x| *x += 1e-13 * diagonal);
     if !factorize(&mut matrix, m) {
         return Err(Error::NotPositiveDefinite { size: m, largest_jitter: 1e-13 });
@@ -129,7 +133,7 @@ struct PairSums {
     sums: Mat<f64>,
 }
 
-/// Position of the unordered pair `i, p`.
+/// Index of the unordered pair `(i, p)`.
 fn pair(i: usize, p: usize) -> usize {
     let (low, high) = (i.min(p), i.max(p));
     high * (high + 1) / 2 + low
@@ -203,7 +207,7 @@ mod tests {
         })
     }
 
-    /// `M_u (x) M_v (x) M_phi` of the kernel matrices between two grids.
+    /// The Kronecker product of the kernel matrices along the three axes, between the points of two grids.
     fn product(x: &[Vec<f64>; 3], z: &[Vec<f64>; 3]) -> DMatrix<f64> {
         let kernels = kernels();
         let [u, v, phi] = std::array::from_fn(|k| {

@@ -4,24 +4,25 @@ use crate::base::error::{Error, Result};
 use crate::base::linalg::{Matrix, symmetric_eigen};
 use crate::kernel::{AxisMetric, Kernel1d};
 
-/// Coordinates and targets on a lattice: what a lattice process is fitted to.
+/// Coordinates and targets on a lattice, to which a lattice process is fitted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeData {
     /// Kernel coordinates of the nodes along each axis.
     pub coordinates: [Vec<f64>; 3],
     /// How distance is measured along each axis.
     pub metrics: [AxisMetric; 3],
-    /// Whether functions of each axis are even: the kernel is then `k(x, y) + k(x, -y)`. With the chord metric they
-    /// are even about `pi/2` too, and the process is that of the whole circle given mirrored targets.
+    /// Whether functions along each axis are even; the kernel is then `k(x, y) + k(x, -y)`. With the chord
+    /// metric they are even about `pi/2` too, and the process is that of the whole circle given mirrored
+    /// targets.
     pub mirrored: [bool; 3],
-    /// `[channel][A][B][C]`, last axis fastest; zero mean.
+    /// Zero-mean targets, `[channel][A][B][C]`, last axis fastest.
     pub targets: Vec<f64>,
     /// Number of channels; they share hyper-parameters.
     pub channels: usize,
 }
 
 impl LatticeData {
-    /// Nodes along each axis.
+    /// Number of nodes along each axis.
     #[must_use]
     pub fn shape(&self) -> [usize; 3] {
         [self.coordinates[0].len(), self.coordinates[1].len(), self.coordinates[2].len()]
@@ -42,7 +43,8 @@ impl LatticeData {
     /// Checks sizes and finiteness.
     ///
     /// # Errors
-    /// An empty axis, a number of targets other than `channels A B C`, a coordinate or target that is not finite.
+    /// An empty axis, a number of targets other than `channels A B C`, a coordinate or target that is not
+    /// finite.
     pub fn validate(&self) -> Result<()> {
         if self.is_empty() || self.targets.len() != self.channels * self.len() || self.channels == 0 {
             let expected = format!("{} channels x {} nodes, at least one of each", self.channels, self.len());
@@ -56,18 +58,19 @@ impl LatticeData {
         Ok(())
     }
 
-    /// The mirror image of a coordinate of axis `k`, where there is one.
+    /// The mirror image of a coordinate along axis `k`, if that axis is mirrored.
     pub(super) fn image(&self, k: usize, x: f64) -> Option<f64> {
         self.mirrored[k].then_some(-x)
     }
 
-    /// `k(x, x)` of axis `k`.
+    /// Prior variance `k(x, x)` along axis `k`.
     pub(super) fn axis_variance(&self, k: usize, kernel: &Kernel1d, x: f64) -> f64 {
         let image = self.image(k, x).map(|image| kernel.value(self.metrics[k].distance(x, image)));
         kernel.value(0.0) + image.unwrap_or(0.0)
     }
 
-    /// The covariance of axis `k` and its derivatives in the kernel's log-parameters.
+    /// The covariance of the nodes along axis `k` and, if `derivatives` is set, its derivatives with respect
+    /// to the kernel's log-parameters.
     pub(super) fn gram(&self, k: usize, kernel: &Kernel1d, derivatives: bool) -> (Matrix, Vec<Matrix>) {
         let (x, metric) = (&self.coordinates[k], self.metrics[k]);
         let n = x.len();
@@ -98,7 +101,8 @@ impl LatticeData {
         (gram, slopes)
     }
 
-    /// Eigendecompositions of the three axes, and the derivatives of their covariances.
+    /// The eigendecompositions of the covariances along the three axes and, if `derivatives` is set, the
+    /// derivatives of these covariances.
     pub(super) fn eigen(
         &self,
         kernels: &[Kernel1d; 3],
@@ -114,14 +118,14 @@ impl LatticeData {
     }
 }
 
-/// Eigendecomposition of one axis's covariance.
+/// The eigendecomposition of the covariance along one axis.
 #[derive(Clone, Debug)]
 pub(crate) struct AxisEigen {
     pub(crate) vectors: Matrix,
     pub(crate) values: Vec<f64>,
 }
 
-/// For each axis the derivatives of its covariance in the log-parameters of its kernel.
+/// For each axis, the derivatives of its covariance with respect to the log-parameters of its kernel.
 pub(super) type AxisSlopes = [Vec<Matrix>; 3];
 
 impl AxisEigen {

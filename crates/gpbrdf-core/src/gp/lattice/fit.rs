@@ -1,4 +1,4 @@
-//! Hyper-parameters of the lattice process by maximum marginal likelihood.
+//! The search for the hyper-parameters of the lattice process, by maximum marginal likelihood.
 
 use crate::base::error::{Error, Result};
 use crate::gp::hyper::{AXIS_NAMES, MIN_NOISE_RATIO};
@@ -9,13 +9,14 @@ use crate::kernel::{Kernel1d, ParameterKind};
 
 /// Fits a lattice process; the search starts from the parameters of `kernels`.
 ///
-/// With [`Noise::Optimized`] the signal variance is profiled out and the search runs over the kernels and the ratio
-/// of noise to signal; with [`Noise::Fixed`] over the kernels and the signal variance. Large lattices are first fitted
-/// on every second node of each axis, which costs an eighth. One evaluation is `O(n (A + B + C))`; `evaluation` is called
-/// before each, and its error ends the search.
+/// With [`Noise::Optimized`] the signal variance is profiled out, and the search runs over the parameters of
+/// the kernels and the ratio of noise to signal variance. With [`Noise::Fixed`] it runs over the parameters
+/// of the kernels and the signal variance. A large lattice is first fitted on every second node along each
+/// axis, which costs an eighth. One evaluation takes `O(n (A + B + C))`. `evaluation` is called before each
+/// evaluation of the likelihood, and an error that it returns ends the search.
 ///
 /// # Errors
-/// Broken data, kernels or noise, and those of `evaluation`.
+/// Invalid data, kernels or noise variance, and the errors of `evaluation`.
 pub fn fit_lattice(
     data: LatticeData,
     kernels: &[Kernel1d; 3],
@@ -57,7 +58,8 @@ pub fn fit_lattice(
 }
 
 impl LatticeData {
-    /// Every second node along each axis: an eighth of the work for a first guess at the hyper-parameters.
+    /// The lattice with every second node along each axis, which gives a first guess at the hyper-parameters
+    /// for an eighth of the work.
     fn decimated(&self) -> Self {
         let [_, b, c] = self.shape();
         let coordinates =
@@ -74,14 +76,15 @@ impl LatticeData {
     }
 }
 
-/// Kernels with their current log-parameters, and the rule for the noise.
+/// The kernels with their current log-parameters, and the rule for the noise variance.
 struct Problem {
     kernels: [Kernel1d; 3],
     noise: Noise,
 }
 
 impl Problem {
-    /// All parameters with start and bounds: the three kernels, then the noise ratio or the signal variance.
+    /// All parameters with their starts and bounds: those of the three kernels, then the noise ratio or the
+    /// signal variance.
     fn parameters(&self, data: &LatticeData, variance: f64) -> Vec<Parameter> {
         let mut parameters = Vec::new();
         for (k, kernel) in self.kernels.iter().enumerate() {
@@ -92,7 +95,7 @@ impl Problem {
             let kinds = kernel.parameter_kinds(k).into_iter();
             for ((kind, name), start) in kinds.zip(kernel.parameter_names()).zip(kernel.log_parameters()) {
                 let (lower, upper) = match kind {
-                    // Below the spacing of the nodes a length scale means nothing.
+                    // Nodes cannot tell apart length scales that are shorter than their spacing.
                     ParameterKind::LengthScale(_) => (0.7 * extent / x.len() as f64, 20.0 * extent),
                     ParameterKind::Alpha => (0.05, 1e3),
                     ParameterKind::Weight | ParameterKind::Variance => (1e-5, 1e5),
@@ -118,7 +121,7 @@ impl Problem {
         parameters
     }
 
-    /// Writes log-parameters into the kernels; returns the last one, which is not a kernel's.
+    /// Writes log-parameters into the kernels and returns the last one, which does not belong to a kernel.
     fn set(&mut self, log_parameters: &[f64]) -> Result<f64> {
         let mut rest = log_parameters;
         for kernel in &mut self.kernels {
@@ -159,7 +162,7 @@ impl Problem {
         })
     }
 
-    /// The hyper-parameters at a result.
+    /// The hyper-parameters at the optimum that a search has found.
     fn hyper(&mut self, data: &LatticeData, log_parameters: &[f64]) -> Result<LatticeHyper> {
         let last = self.set(log_parameters)?.exp();
         let (signal_variance, noise_variance) = match self.noise {

@@ -4,9 +4,9 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
-/// For each axis the matrix of inner products of a tensor's slices, weighted along the other two axes:
-/// `G_u[a, a'] = sum_bc w_v[b] w_phi[c] x[a, b, c] x[a', b, c]` and likewise for `v` and `phi`, summed over
-/// channels. `roots` holds the square roots of the weights of each axis.
+/// For each axis, the matrix of inner products of a tensor's slices, weighted along the other two axes:
+/// `G_u[a, a'] = sum_bc w_v[b] w_phi[c] x[a, b, c] x[a', b, c]`, and likewise for `v` and `phi`, summed over
+/// the channels. `roots` holds the square roots of the weights along each axis.
 pub(crate) fn weighted_grams(roots: [&[f64]; 3], x: &[f64], channels: usize) -> [Mat<f64>; 3] {
     let [a, b, c] = roots.map(<[f64]>::len);
     let mut tasks: Vec<(usize, &[f64])> = Vec::with_capacity(3 * channels);

@@ -7,14 +7,14 @@ use crate::base::linalg::{Matrix, View, product_into, product_into_slice, view, 
 /// Applies `M_u (x) M_v (x) M_phi` to each of `channels` tensors.
 ///
 /// `x` is `[channel][A][B][C]`, last index fastest, with `M_u` of shape `A' x A` and so on; the result is
-/// `[channel][A'][B'][C']`. Costs `A B C C' + A B B' C' + A A' B' C'` multiply-adds a channel. Every output
+/// `[channel][A'][B'][C']`. Costs `A B B' C + A B' C C' + A A' B' C'` multiply-adds per channel. Every
 /// element is summed in one fixed order, so the result does not depend on the number of threads.
 pub(crate) fn apply(matrices: [View<'_>; 3], x: &[f64], channels: usize) -> Vec<f64> {
     let [m_u, m_v, m_phi] = matrices;
     let [a_in, b_in, c_in] = matrices.map(|m| m.ncols());
     let [a_out, b_out, c_out] = matrices.map(|m| m.nrows());
     debug_assert_eq!(x.len(), channels * a_in * b_in * c_in);
-    // Slabs of constant (channel, a): phi first, then v.
+    // Slabs of constant (channel, a): contract along v first, then along phi.
     let mut half = vec![0.0; channels * a_in * b_out * c_out];
     half.par_chunks_mut(b_out * c_out).zip(x.par_chunks(b_in * c_in)).for_each_init(
         || Matrix::zeros(c_in, b_out),
@@ -24,7 +24,8 @@ pub(crate) fn apply(matrices: [View<'_>; 3], x: &[f64], channels: usize) -> Vec<
             product_into_slice(out, m_phi, view(scratch));
         },
     );
-    // Then u: one (B' C') x A matrix a channel, a few output columns a task.
+    // Then along u: one (B' C') x A matrix per channel, from which each task computes a few columns of the
+    // result.
     let plane = b_out * c_out;
     let group = a_out.div_ceil(4).max(1);
     let mut out = vec![0.0; channels * a_out * plane];

@@ -9,26 +9,28 @@ use super::{LatticeHyper, precision};
 use crate::base::error::Result;
 use crate::kernel::Kernel1d;
 
-/// Log marginal likelihood of a lattice process and its gradient in log-parameters.
+/// Log marginal likelihood of a lattice process and its gradient with respect to logarithms of the
+/// parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LatticeLikelihood {
-    /// Summed over channels (paper eq. 16).
+    /// Log marginal likelihood, summed over the channels (paper eq. 16).
     pub value: f64,
-    /// With respect to `ln s^2` at fixed noise variance.
+    /// Derivative with respect to `ln s^2` at fixed noise variance.
     pub d_signal: f64,
-    /// With respect to the logarithm of the noise variance at fixed `s^2`.
+    /// Derivative with respect to the logarithm of the noise variance at fixed `s^2`.
     pub d_noise: f64,
-    /// With respect to the log-parameters of each axis's kernel.
+    /// Derivatives with respect to the log-parameters of the kernel of each axis.
     pub d_axes: [Vec<f64>; 3],
 }
 
 impl LatticeData {
-    /// Log marginal likelihood at given hyper-parameters and its gradient.
+    /// Evaluates the log marginal likelihood and its gradient at the given hyper-parameters.
     ///
-    /// With `z = (Q_u (x) Q_v (x) Q_phi)^T y` and `D = 1 / (lambda_u lambda_v lambda_phi + rho)`:
-    /// `-1/2 sum z^2 D / s^2 - 1/2 sum ln(s^2 / D) - n/2 ln 2 pi` a channel (paper eq. 16). The derivative in a
-    /// parameter of axis `u` is `1/2 tr(Q_u H Q_u^T dK_u)` with
-    /// `H[a, a'] = sum_bc lambda_b lambda_c (beta_abc beta_a'bc / s^2 - [a = a'] D_abc)`, `beta = z D` (eq. 17).
+    /// With `z = (Q_u (x) Q_v (x) Q_phi)^T y` and `D = 1 / (lambda_u lambda_v lambda_phi + rho)`, each
+    /// channel contributes `-1/2 sum z^2 D / s^2 - 1/2 sum ln(s^2 / D) - n/2 ln 2 pi` (paper eq. 16). The
+    /// derivative with respect to a log-parameter of axis `u` is `1/2 tr(Q_u H Q_u^T dK_u)` with
+    /// `H[a, a'] = sum_bc lambda_b lambda_c (beta_abc beta_a'bc / s^2 - [a = a'] D_abc)` and `beta = z D`
+    /// (eq. 17).
     ///
     /// # Errors
     /// Covariances that are not finite.
@@ -38,8 +40,9 @@ impl LatticeData {
         Ok(spectrum.likelihood(self, hyper.signal_variance))
     }
 
-    /// [`LatticeData::likelihood`] at the signal variance that maximises it for a given
-    /// `ratio = noise / s^2`: `s^2 = sum z^2 D / (channels n)`. The gradient in `ln ratio` is `d_noise`.
+    /// Evaluates [`LatticeData::likelihood`] at the signal variance that maximises it for a given
+    /// `ratio = noise / s^2`: `s^2 = sum z^2 D / (channels n)`. Returns that signal variance and the
+    /// likelihood, whose `d_noise` is the derivative with respect to `ln ratio`.
     ///
     /// # Errors
     /// Covariances that are not finite.
@@ -54,7 +57,7 @@ impl LatticeData {
     }
 }
 
-/// Targets and noise in the eigenbasis.
+/// The covariance and the targets in the eigenbasis.
 struct TargetSpectrum {
     eigen: [AxisEigen; 3],
     slopes: AxisSlopes,
@@ -78,7 +81,8 @@ impl TargetSpectrum {
     fn likelihood(&self, data: &LatticeData, signal_variance: f64) -> LatticeLikelihood {
         let [a, b, c] = data.shape();
         let (n, channels) = (self.d.len() as f64, data.channels as f64);
-        // ln of products of eight: an eighth of the logarithms, and no overflow at any sensible scale.
+        // The logarithm is taken of products of eight factors: an eighth of the logarithms, and no overflow
+        // at any sensible scale.
         let log_det: f64 = -self.d.chunks(8).map(|d| d.iter().product::<f64>().ln()).sum::<f64>();
         let value = -0.5 * self.sum_z2_d / signal_variance
             - 0.5 * channels * (n * (signal_variance.ln() + (2.0 * std::f64::consts::PI).ln()) + log_det);
@@ -94,7 +98,7 @@ impl TargetSpectrum {
         let d_noise = 0.5 * self.ratio * (sum_beta2 / signal_variance - channels * sum_d);
         let d_scale = 0.5 * (self.sum_z2_d / signal_variance - channels * n);
         let [lu, lv, lp] = self.eigen.each_ref().map(|e| e.values.as_slice());
-        // Traces: sums of D weighted by the eigenvalues of the other two axes.
+        // The traces are sums of D weighted by the eigenvalues of the other two axes.
         let mut traces = [vec![0.0; a], vec![0.0; b], vec![0.0; c]];
         for (i, plane) in self.d.chunks(b * c).enumerate() {
             for (j, row) in plane.chunks(c).enumerate() {

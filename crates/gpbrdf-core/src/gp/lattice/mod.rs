@@ -1,10 +1,10 @@
 //! The exact Gaussian process on a product lattice.
 //!
-//! A product kernel `s^2 k_u k_v k_phi` on `A x B x C` nodes has the covariance
-//! `s^2 K_u (x) K_v (x) K_phi`. With `K_x = Q_x diag(lambda_x) Q_x^T` and `rho = noise / s^2`, everything that
-//! the dense process needs a factorisation of an `n x n` matrix for (`n = A B C`) becomes contractions with
-//! three small matrices, `O(n (A + B + C))` each; see Y. Saatci, "Scalable Inference for Structured Gaussian
-//! Process Models" (2011), chapter 5.
+//! A product kernel `s^2 k_u k_v k_phi` on `A x B x C` nodes has the covariance `s^2 K_u (x) K_v (x) K_phi`.
+//! With `K_x = Q_x diag(lambda_x) Q_x^T` and `rho = noise / s^2`, every step for which the dense process
+//! factorises an `n x n` matrix (`n = A B C`) becomes a contraction with three small matrices, which costs
+//! `O(n (A + B + C))`; see Y. Saatci, "Scalable Inference for Structured Gaussian Process Models" (2011),
+//! chapter 5.
 
 mod data;
 #[cfg(feature = "fit")]
@@ -39,7 +39,7 @@ use crate::kernel::Kernel1d;
 /// Hyper-parameters of a lattice process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LatticeHyper {
-    /// `s^2`, in squared target units.
+    /// Signal variance `s^2`, in squared target units.
     pub signal_variance: f64,
     /// Noise variance, in squared target units.
     pub noise_variance: f64,
@@ -52,22 +52,23 @@ pub struct LatticeHyper {
 pub struct LatticeGp {
     data: LatticeData,
     hyper: LatticeHyper,
-    /// `(K + rho I)^-1 y`, laid out like the targets.
+    /// The weights `(K + rho I)^-1 y`, laid out like the targets.
     weights: Vec<f64>,
-    /// What variances need; a process that was loaded makes it when it is first asked for one.
+    /// The eigendecomposition that variances need. A process that was loaded from a file computes it when the
+    /// first variance is predicted.
     spectrum: OnceLock<Spectrum>,
 }
 
 /// The covariance in its eigenbasis.
 #[derive(Clone, Debug)]
 pub(crate) struct Spectrum {
-    /// Of each axis.
+    /// The eigendecomposition of the covariance along each axis.
     pub(crate) eigen: [AxisEigen; 3],
     /// `1 / (lambda_u lambda_v lambda_phi + rho)`, laid out like one channel.
     pub(crate) precision: Vec<f64>,
 }
 
-/// [`Spectrum::precision`].
+/// Computes [`Spectrum::precision`], with `ratio` for `rho`.
 fn precision(eigen: &[AxisEigen; 3], ratio: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(eigen.iter().map(|e| e.values.len()).product());
     for &u in &eigen[0].values {
@@ -87,10 +88,10 @@ impl Spectrum {
 }
 
 impl LatticeGp {
-    /// Conditions the process on `data` (paper eqs. 12 and 13). `O(n (A + B + C))` time a channel.
+    /// Conditions the process on `data` (paper eqs. 12 and 13). Takes `O(n (A + B + C))` time per channel.
     ///
     /// # Errors
-    /// Data of the wrong size or not finite, hyper-parameters out of range.
+    /// Data of the wrong size, data that are not finite, or hyper-parameters out of range.
     pub fn new(data: LatticeData, hyper: LatticeHyper) -> Result<Self> {
         data.validate()?;
         hyper.validate()?;
@@ -104,11 +105,11 @@ impl LatticeGp {
         Ok(Self { data, hyper, weights, spectrum: OnceLock::from(spectrum) })
     }
 
-    /// A process whose weights are known already, from a file: predictions of the mean use them as they are, and nothing
-    /// is factorised before the first variance.
+    /// A process whose weights were read from a file or computed elsewhere. Predicted means use the weights
+    /// as they are, and nothing is factorised before the first variance is predicted.
     ///
     /// # Errors
-    /// As [`LatticeGp::new`], and weights of the wrong number.
+    /// Those of [`LatticeGp::new`], and a number of weights that differs from that of the targets.
     pub(crate) fn from_weights(data: LatticeData, hyper: LatticeHyper, weights: Vec<f64>) -> Result<Self> {
         data.validate()?;
         hyper.validate()?;
@@ -118,7 +119,7 @@ impl LatticeGp {
         Ok(Self { data, hyper, weights, spectrum: OnceLock::new() })
     }
 
-    /// What variances need, made when it is first needed. `O(A^3 + B^3 + C^3)`.
+    /// The eigendecomposition that variances need, computed when it is first needed in `O(A^3 + B^3 + C^3)`.
     pub(crate) fn spectrum(&self) -> Result<&Spectrum> {
         if let Some(spectrum) = self.spectrum.get() {
             return Ok(spectrum);
@@ -139,14 +140,14 @@ impl LatticeGp {
         &self.hyper
     }
 
-    /// `(K + rho I)^-1 y`, laid out like the targets: the predictive mean is `k(x, X) . weights`.
+    /// The weights `(K + rho I)^-1 y`, laid out like the targets: the predictive mean is `k(x, X) . weights`.
     #[must_use]
     pub fn weights(&self) -> &[f64] {
         &self.weights
     }
 
-    /// Kernel values between `points` (coordinates along axis `k`) and the nodes: `points x nodes`, stored
-    /// column by column.
+    /// Kernel values between `points`, which are coordinates along axis `k`, and the nodes: `points x nodes`,
+    /// stored column by column.
     #[must_use]
     pub(crate) fn cross(&self, k: usize, points: &[f64]) -> Matrix {
         let mut out = Matrix::zeros(points.len(), self.data.coordinates[k].len());
@@ -164,8 +165,8 @@ impl LatticeGp {
         out
     }
 
-    /// Predictive mean (paper eq. 12) at points given by their three kernel coordinates:
-    /// `[point][channel]`. `O(n)` a point, in parallel.
+    /// Predictive mean (paper eq. 12) at points given by their three kernel coordinates: `[point][channel]`.
+    /// Costs `O(n)` per point, in parallel.
     #[must_use]
     pub fn predict_mean(&self, points: &[[f64; 3]]) -> Vec<f64> {
         let channels = self.data.channels;
@@ -174,7 +175,7 @@ impl LatticeGp {
             .par_chunks(64)
             .flat_map_iter(|points| {
                 let [ku, kv, kp] = self.cross_rows(points);
-                // All points and channels: contract u by one product.
+                // For each channel, one matrix product contracts along u for all points of the block.
                 let mut out = Vec::with_capacity(points.len() * channels);
                 let mut contracted = Matrix::zeros(b * c, points.len());
                 let mut sums = vec![0.0; points.len() * channels];
@@ -198,12 +199,12 @@ impl LatticeGp {
             .collect()
     }
 
-    /// Latent predictive variance (paper eq. 13) at points given by their three kernel coordinates, the same for
-    /// every channel: `s^2 (k(x, x) - sum D (k Q)^2)`. `O(n)` a point, in parallel. Add the noise variance for
-    /// that of a new observation.
+    /// Latent predictive variance (paper eq. 13) at points given by their three kernel coordinates, the same
+    /// for every channel: `s^2 (k(x, x) - sum D (k Q)^2)`. Costs `O(n)` per point, in parallel. For the
+    /// variance of a new observation, add the noise variance.
     ///
     /// # Errors
-    /// Covariances of an axis that have no eigendecomposition.
+    /// A covariance along an axis that has no eigendecomposition.
     pub fn predict_variance_latent(&self, points: &[[f64; 3]]) -> Result<Vec<f64>> {
         let [a, b, c] = self.data.shape();
         let spectrum = self.spectrum()?;
@@ -228,13 +229,13 @@ impl LatticeGp {
         Ok(variances.collect())
     }
 
-    /// `k(x, x)` without the signal variance, at kernel coordinates `x`.
+    /// Prior variance `k(x, x)` without the signal variance, at kernel coordinates `x`.
     #[must_use]
     pub(crate) fn prior_variance(&self, x: [f64; 3]) -> f64 {
         (0..3).map(|k| self.axis_variance(k, x[k])).product()
     }
 
-    /// `k(x, x)` of axis `k` at its coordinate `x`.
+    /// Prior variance `k(x, x)` along axis `k` at its coordinate `x`.
     pub(crate) fn axis_variance(&self, k: usize, x: f64) -> f64 {
         self.data.axis_variance(k, &self.hyper.kernels[k], x)
     }
@@ -243,8 +244,8 @@ impl LatticeGp {
         std::array::from_fn(|k| self.cross(k, &points.iter().map(|p| p[k]).collect::<Vec<_>>()))
     }
 
-    /// Leave-one-out residuals `y_i - mean_-i(x_i)`, laid out like the targets
-    /// (Rasmussen and Williams 2006, eq. 5.12): `w_i / [(K + rho I)^-1]_ii`. `O(n (A + B + C))`.
+    /// Leave-one-out residuals `y_i - mean_-i(x_i)`, laid out like the targets: `w_i / [(K + rho I)^-1]_ii`
+    /// (Rasmussen and Williams 2006, eq. 5.12). Costs `O(n (A + B + C))`.
     ///
     /// # Errors
     /// Those of [`LatticeGp::predict_variance_latent`].
@@ -261,7 +262,7 @@ impl LatticeHyper {
     /// Checks every value.
     ///
     /// # Errors
-    /// A variance that is not positive and finite, or a broken kernel.
+    /// A variance that is not positive and finite, or an invalid kernel.
     pub fn validate(&self) -> Result<()> {
         for (what, value) in
             [("signal variance", self.signal_variance), ("noise variance", self.noise_variance)]

@@ -22,21 +22,21 @@ use crate::sample::space::{InputSpace, WarpedBox};
 /// The solver's name in files and reports.
 pub(crate) const NAME: &str = "lattice";
 
-/// A lattice process and the box in which its lattice stands.
+/// A lattice process and the warped box that its lattice lies in.
 #[derive(Debug)]
 pub(super) struct LatticePosterior {
     pub(super) gp: LatticeGp,
     pub(super) space: WarpedBox,
 }
 
-/// A saved process, but for its tensors.
+/// The parts of a saved process that are not tensors.
 #[derive(Serialize, Deserialize)]
 struct Header {
     space: WarpedBox,
     hyper: LatticeHyper,
 }
 
-/// Reads what [`Posterior::save`] has written.
+/// Reads a process that [`Posterior::save`] has written.
 pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
     let Header { space, hyper } = tensors.header(header)?;
     space.validate().map_err(|e| tensors.damaged(e))?;
@@ -167,8 +167,12 @@ impl Posterior for LatticePosterior {
     }
 }
 
-/// The name of a product of one kernel along each axis, after the first axis.
+/// The name of a product of one kernel along each axis; of one kernel where all axes have the same shapes.
 pub(crate) fn product_name(kernels: &[Kernel1d; 3]) -> String {
-    let names: Vec<&str> = kernels[0].terms.iter().map(|term| term.shape.name()).collect();
-    format!("product of {} along u, v, phi", names.join(" + "))
+    let names = kernels.each_ref().map(|kernel| {
+        let shapes: Vec<&str> = kernel.terms.iter().map(|term| term.shape.name()).collect();
+        shapes.join(" + ")
+    });
+    let same = names.iter().all(|name| *name == names[0]);
+    format!("product of {} along u, v, phi", if same { names[0].clone() } else { names.join(", ") })
 }

@@ -4,19 +4,21 @@ use crate::base::error::Result;
 use crate::base::linalg::{Matrix, product, view};
 use crate::gp::lattice::{LatticeGp, Spectrum};
 
-/// Below this share of the largest eigenvalue an eigenvector is rounding only.
+/// An eigenvector whose eigenvalue is below this share of the largest one consists of rounding errors only.
 const SMALLEST_SHARE: f64 = 1e-15;
 
 /// A lattice process in the form that single precision can evaluate:
 /// `mean(x) = sum_ijk coefficients_ijk a_i(x_0) b_j(x_1) c_k(x_2)`.
 ///
-/// The usual form `k(x, X) w` cancels: the weights `w` are larger than the mean by up to the ratio of signal to noise.
-/// With the eigendecomposition `K = Q L Q^T` of each axis's covariance, `a(x) = L^(-1/2) Q^T k(X, x)` is never longer
-/// than the prior standard deviation, and the coefficients `L^(1/2) Q^T w` are about as large as the targets.
+/// The usual form `k(x, X) w` suffers from cancellation: the weights `w` are larger than the mean by up to
+/// the ratio of signal to noise. With the eigendecomposition `K = Q L Q^T` of the covariance along each axis,
+/// `a(x) = L^(-1/2) Q^T k(X, x)` is never longer than the prior standard deviation, and the coefficients
+/// `L^(1/2) Q^T w` are about as large as the targets.
 ///
 /// The variance is a sum of positive terms in the same functions:
-/// `s^2 (r_0 p_1 p_2 + s_0 r_1 p_2 + s_0 s_1 r_2 + sum_ijk unexplained_ijk a_i^2 b_j^2 c_k^2)`, where along each axis
-/// `p` is the prior variance, `s = sum_i a_i^2` what noise-free nodes explain of it, and `r = p - s`.
+/// `s^2 (r_0 p_1 p_2 + s_0 r_1 p_2 + s_0 s_1 r_2 + sum_ijk unexplained_ijk a_i^2 b_j^2 c_k^2)`, where along
+/// each axis `p` is the prior variance, `s = sum_i a_i^2` is the part of it that noise-free nodes explain,
+/// and `r = p - s`.
 #[derive(Clone, Debug)]
 pub struct SeparableForm<'a> {
     gp: &'a LatticeGp,
@@ -29,7 +31,7 @@ pub struct SeparableForm<'a> {
 /// The functions of one axis at some points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisBasis {
-    /// `[point][function]`.
+    /// Values of the functions, `[point][function]`.
     pub values: Vec<f64>,
     /// Prior variance at each point, without the signal variance.
     pub prior: Vec<f64>,
@@ -38,7 +40,7 @@ pub struct AxisBasis {
 }
 
 impl<'a> SeparableForm<'a> {
-    /// Rewrites a process. `O(n (A + B + C))` for each channel.
+    /// Computes the separable form of a process. Costs `O(n (A + B + C))` for each channel.
     ///
     /// # Errors
     /// Those of [`LatticeGp::predict_variance_latent`].
@@ -68,25 +70,26 @@ impl<'a> SeparableForm<'a> {
         Ok(Self { gp, coefficients, unexplained, whitening })
     }
 
-    /// Functions along each axis.
+    /// Number of functions along each axis.
     #[must_use]
     pub fn shape(&self) -> [usize; 3] {
         self.gp.data().shape()
     }
 
-    /// `[channel][i][j][k]`, last index fastest.
+    /// The coefficients, `[channel][i][j][k]`, last index fastest.
     #[must_use]
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
-    /// Share of the variance of each product of functions that noise hides, `[i][j][k]`, in `[0, 1]`.
+    /// For each product of functions, the share of its variance that the noise leaves unexplained:
+    /// `[i][j][k]`, in `[0, 1]`.
     #[must_use]
     pub fn unexplained(&self) -> &[f64] {
         &self.unexplained
     }
 
-    /// The functions of axis `k` at `points`, given by their kernel coordinate.
+    /// Evaluates the functions of axis `k` at `points`, given by their kernel coordinates.
     #[must_use]
     pub fn basis(&self, k: usize, points: &[f64]) -> AxisBasis {
         let product = product(view(&self.gp.cross(k, points)), view(&self.whitening[k]));
@@ -157,7 +160,7 @@ mod tests {
                     variances[n]
                 );
             }
-            // No coefficient is far larger than what it adds up to.
+            // No coefficient is far larger than the means that the terms add up to.
             let largest = means.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!(scale < 200.0 * largest, "{scale} {largest}");
         }

@@ -1,4 +1,4 @@
-//! From samples on a lattice to a posterior.
+//! Fits and conditions the lattice process for samples on a lattice.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::gp::problem::{Fitted, Problem};
 use crate::kernel::{Kernel1d, KernelBody, KernelTerm, Shape, Term1d};
 use crate::sample::lattice::LatticeLayout;
 
-/// Finds hyper-parameters by maximum marginal likelihood and conditions.
+/// Finds hyper-parameters by maximum marginal likelihood and conditions the process at them.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     let lattice = on_lattice(problem)?;
     let data = data_on(lattice, &problem.targets);
@@ -22,7 +22,7 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     Ok((Arc::new(LatticePosterior { gp, space: lattice.space() }), report))
 }
 
-/// Conditions at known hyper-parameters.
+/// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
 pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
     let lattice = on_lattice(problem)?;
     let data = data_on(lattice, &problem.targets);
@@ -37,7 +37,7 @@ fn on_lattice<'a>(problem: &Problem<'a>) -> Result<&'a LatticeLayout> {
     problem.lattice.ok_or_else(|| Error::argument("solver", "dense, for samples off a lattice", "lattice"))
 }
 
-/// Targets on the nodes of a lattice.
+/// Targets on the nodes of a lattice, with the kernel coordinates of the nodes.
 fn data_on(lattice: &LatticeLayout, targets: &[Vec<f64>]) -> LatticeData {
     let space = lattice.space();
     let [u, v, phi] = lattice.nodes();
@@ -54,7 +54,8 @@ fn data_on(lattice: &LatticeLayout, targets: &[Vec<f64>]) -> LatticeData {
     }
 }
 
-/// A sum of `shapes` of equal weight, with length scales spread below the extent of the nodes `x`.
+/// The kernel from which the search along one axis starts: a sum of `shapes` of equal weight, with length
+/// scales of a quarter of the extent of the nodes `x` and less.
 fn starting_kernel(shapes: &[Shape], x: &[f64]) -> Kernel1d {
     let low = x.iter().copied().fold(f64::INFINITY, f64::min);
     let high = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -62,7 +63,7 @@ fn starting_kernel(shapes: &[Shape], x: &[f64]) -> Kernel1d {
     let terms = shapes.iter().enumerate().map(|(i, &shape)| Term1d {
         weight: 1.0,
         shape,
-        // Terms of one shape need different starts to become different.
+        // Terms of the same shape must start at different length scales, or they would stay equal.
         length_scale: 0.25 * extent * 0.5f64.powi(i32::try_from(i).unwrap_or(30)),
     });
     Kernel1d { terms: terms.collect() }

@@ -1,9 +1,10 @@
 //! Predictive mean and variance of a lattice process on the whole table.
 //!
-//! `u` and `phi` are contracted first, for all cells at once. Each column - the 90 cells along `theta_d` of one
-//! `(i_theta_h, i_phi_d)` - then sums over the `B` nodes along `v`, as `v = theta_d / theta_d_max(theta_h, phi_d)`
-//! depends on all three indices. A table takes `90 A B C + 90 180 B C` multiply-adds, `0.55 M B` kernel values, and
-//! for the variance `0.55 M B^2` more multiply-adds.
+//! The contractions along `u` and `phi` come first, for all cells at once. Each column (the 90 cells along
+//! `theta_d` of one `(i_theta_h, i_phi_d)`) is then summed over the `B` nodes along `v`, because
+//! `v = theta_d / theta_d_max(theta_h, phi_d)` depends on all three indices. A table takes
+//! `90 A B C + 90 180 B C` multiply-adds and `0.55e6 B` kernel values, and the variance takes `0.55e6 B^2`
+//! more multiply-adds.
 
 use rayon::prelude::*;
 
@@ -17,11 +18,12 @@ use crate::kernel::GridScratch;
 use crate::sample::space::WarpedBox;
 use crate::sample::symmetry::Symmetry;
 
-/// Distinct `|cos phi_d|` of the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
+/// Number of distinct `|cos phi_d|` among the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
 const N_COLUMNS: usize = N_PHI_D / 2;
 
-/// Hands the means of every column to `emit`: the slab of its `i_theta_h` out of `slabs`, each `i_phi_d` that
-/// the column serves, and the means `[channel][i_theta_d]`. Slabs run in parallel; each is written by one task.
+/// Computes the means of every column and passes them to `emit`, whose arguments are the slab of the column's
+/// `i_theta_h` out of `slabs`, every `i_phi_d` that the means are for, and the means `[channel][i_theta_d]`.
+/// Slabs are computed in parallel, each by one task.
 pub(crate) fn bake_means<S: Send>(
     gp: &LatticeGp,
     space: WarpedBox,
@@ -47,7 +49,8 @@ pub(crate) fn bake_means<S: Send>(
     });
 }
 
-/// Hands the latent variances `[i_theta_d]` of every column to `emit`, like [`bake_means`].
+/// Computes the latent variances `[i_theta_d]` of every column and passes them to `emit`, like
+/// [`bake_means`].
 pub(crate) fn bake_variances<S: Send>(
     gp: &LatticeGp,
     space: WarpedBox,
@@ -59,7 +62,7 @@ pub(crate) fn bake_variances<S: Send>(
     let [along_u, along_phi] = [(0, geometry.first()), (2, geometry.third())]
         .map(|(k, points)| squared(&product(view(&gp.cross(k, points)), view(&spectrum.eigen[k].vectors))));
     let contracted = contract_u(gp, &spectrum.precision, &along_u);
-    // Along u and v the prior variance is the same everywhere.
+    // The prior variance is constant along u and v.
     let priors: Vec<f64> = geometry.third().iter().map(|&phi| gp.prior_variance([0.0, 0.0, phi])).collect();
     let scale = gp.hyper().signal_variance;
     slabs.enumerate().for_each_init(Column::default, |column, (i, mut slab)| {
@@ -77,8 +80,8 @@ pub(crate) fn bake_variances<S: Send>(
     Ok(())
 }
 
-/// Rows of the contracted weights that share the kernel values of column `j`, each with the `i_phi_d` it is for: one
-/// row for both halves of `phi_d` where the process is bilateral.
+/// The rows of the contracted weights that share the kernel values of column `j`, each with every `i_phi_d`
+/// that it is for. A bilateral process has one row for both halves of `phi_d`.
 fn mirrored_rows(symmetry: Symmetry, j: usize) -> Vec<(usize, Vec<usize>)> {
     let mirror = N_PHI_D - 1 - j;
     match symmetry {
@@ -87,13 +90,13 @@ fn mirrored_rows(symmetry: Symmetry, j: usize) -> Vec<(usize, Vec<usize>)> {
     }
 }
 
-/// `(B C) x 90` out of `A x B x C`.
+/// Contracts `A x B x C` weights along `u`. The result is `(B C) x 90`.
 fn contract_u(gp: &LatticeGp, weights: &[f64], along_u: &Matrix) -> Matrix {
     let [a, b, c] = gp.data().shape();
     product(view_slice(weights, b * c, a), view(along_u).transpose())
 }
 
-/// `rows x B` for one `i_theta_h`.
+/// Contracts along `phi` for one `i_theta_h`. The result is `rows x B`.
 fn contract_phi(gp: &LatticeGp, contracted: &Matrix, i: usize, along_phi: &Matrix) -> Matrix {
     let [_, b, c] = gp.data().shape();
     let slice: Vec<f64> = (0..b * c).map(|row| contracted[(row, i)]).collect();
@@ -105,7 +108,7 @@ fn contract_phi(gp: &LatticeGp, contracted: &Matrix, i: usize, along_phi: &Matri
 /// Kernel values along one column.
 #[derive(Default)]
 struct Column {
-    /// Warped `v` of the cells above the horizon, then one 1 that stands for all others.
+    /// Warped `v` of the cells above the horizon, followed by a single 1 for all cells below it.
     v: Vec<f64>,
     /// `[node][cell]`.
     kernels: Vec<f64>,
@@ -115,7 +118,7 @@ struct Column {
 }
 
 impl Column {
-    /// Takes the column of `i_theta_h = i` and `i_phi_d = j`.
+    /// Computes the kernel values of the column with `i_theta_h = i` and `i_phi_d = j`.
     fn fill(&mut self, gp: &LatticeGp, geometry: &TableGeometry, i: usize, j: usize) {
         self.v.clear();
         self.v.extend(geometry.column(i, j));
@@ -131,7 +134,7 @@ impl Column {
         product_into_slice(&mut self.projected, view_slice(&self.kernels, count, nodes), view(vectors));
     }
 
-    /// Means `[channel][cell]` of one row of the contracted weights of each channel.
+    /// Computes the means `[channel][cell]` from one row of the contracted weights of each channel.
     fn sum_means(&self, weights: &[Matrix], row: usize, means: &mut [f64]) {
         let count = self.v.len();
         for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
@@ -142,7 +145,7 @@ impl Column {
         }
     }
 
-    /// Latent variances `[cell]` of one row of the contracted precisions.
+    /// Computes the latent variances `[cell]` from one row of the contracted precisions.
     fn sum_variances(&self, weights: &Matrix, row: usize, prior: f64, scale: f64, variances: &mut [f64]) {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);

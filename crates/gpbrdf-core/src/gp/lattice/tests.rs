@@ -4,11 +4,11 @@ use crate::kernel::AxisMetric;
 use crate::kernel::{Shape, Term1d};
 use nalgebra::{DMatrix, DVector};
 
-/// The kinds of third axis: metric, and whether it is mirrored.
+/// The kinds of third axis: its metric, and whether it is mirrored.
 const AXES: [(AxisMetric, bool); 3] =
     [(AxisMetric::Linear, false), (AxisMetric::Chord, false), (AxisMetric::Chord, true)];
 
-/// Every closed and general shape in some axis, and sums.
+/// Hyper-parameters in which every shape occurs along some axis, alone or in a sum.
 fn cases() -> Vec<LatticeHyper> {
     let single = Kernel1d::new;
     let sum = Kernel1d {
@@ -49,7 +49,7 @@ fn points(data: &LatticeData) -> Vec<[f64; 3]> {
     u.iter().flat_map(grid).collect()
 }
 
-/// The textbook dense process, by nalgebra.
+/// The textbook dense process, computed with nalgebra.
 struct Oracle {
     inverse: DMatrix<f64>,
     #[cfg(feature = "fit")]
@@ -170,7 +170,7 @@ fn gradients_agree_with_finite_differences() {
             let check = |slope: f64, move_by: &dyn Fn(f64) -> LatticeHyper| {
                 let step = 1e-4;
                 let value = |s: f64| data.likelihood(&move_by(s)).unwrap().value;
-                // Fourth order, so that the step can be large.
+                // Differences of fourth order, which allow a large step.
                 let numeric = (8.0 * (value(step) - value(-step)) - (value(2.0 * step) - value(-2.0 * step)))
                     / (12.0 * step);
                 assert!((slope - numeric).abs() < 1e-6 * (1.0 + slope.abs()), "{slope} {numeric}");
@@ -242,9 +242,10 @@ fn a_mirrored_lattice_is_the_whole_circle_with_mirrored_targets() {
     let targets = half.targets.chunks(c).flat_map(mirror).collect();
     let whole = LatticeData { coordinates: [u, v, circle], mirrored: [false; 3], targets, ..half.clone() };
     let hyper = cases()[0].clone();
-    // Each pair of mirrored measurements counts as two, so each has twice the noise.
+    // Every target occurs twice on the circle, so each occurrence has twice the noise variance.
     let noisy = LatticeHyper { noise_variance: 2.0 * hyper.noise_variance, ..hyper.clone() };
-    // The process of the half has the covariance of the sum over both images: twice the average.
+    // The kernel of the half circle is the sum over both images, and the covariance of mirrored values on the
+    // circle is their average: half the signal variance makes them equal.
     let halved = LatticeHyper {
         signal_variance: 0.5 * hyper.signal_variance,
         noise_variance: hyper.noise_variance,

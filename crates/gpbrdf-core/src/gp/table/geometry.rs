@@ -7,11 +7,12 @@ use crate::brdf::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 use crate::sample::space::{InputSpace, WarpedBox};
 use crate::sample::symmetry::Symmetry;
 
-/// The kernel coordinates of every cell's centre, as the factors of which they are products.
+/// The kernel coordinates of every cell's centre, stored as the factors from which they are computed.
 ///
-/// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` stands at `first[i]`, `min(second[l] scale(i, p), limit)` and
-/// `third[row(p)]`. In the warped box all cells of a column `(i, p)` that are below the horizon are alike, and where
-/// `phi_d` is folded both halves of it: 0.56 M distinct points in place of 1.46 M.
+/// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` has the coordinates `first[i]`,
+/// `min(second[l] scale(i, p), limit)` and `third[row(p)]`. In the warped box all cells of a column `(i, p)`
+/// that are below the horizon have the same coordinates, and where `phi_d` is folded its two halves have the
+/// same ones: there are 0.56 million distinct points instead of 1.46 million.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableGeometry {
     first: Vec<f64>,
@@ -19,12 +20,12 @@ pub struct TableGeometry {
     third: Vec<f64>,
     /// `[i_theta_h][column]`.
     scale: Vec<f64>,
-    /// Cells of each column whose coordinates differ, laid out like `scale`.
+    /// Number of cells with coordinates of their own in each column, laid out like `scale`.
     distinct: Vec<usize>,
     limit: f64,
 }
 
-/// Distinct `|cos phi_d|` of the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
+/// Number of distinct `|cos phi_d|` among the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
 const COLUMNS: usize = N_PHI_D / 2;
 
 impl TableGeometry {
@@ -62,39 +63,39 @@ impl TableGeometry {
         Self { first, second, third, scale, distinct, limit }
     }
 
-    /// First coordinate by `i_theta_h`.
+    /// First coordinate of each `i_theta_h`.
     #[must_use]
     pub fn first(&self) -> &[f64] {
         &self.first
     }
 
-    /// What depends on `i_theta_d` in the second coordinate.
+    /// The factor of the second coordinate that depends on `i_theta_d`.
     #[must_use]
     pub fn second(&self) -> &[f64] {
         &self.second
     }
 
-    /// Third coordinate by row: 90 rows where `phi_d` is folded, else 180.
+    /// Third coordinate of each row: there are 90 rows where `phi_d` is folded, else 180.
     #[must_use]
     pub fn third(&self) -> &[f64] {
         &self.third
     }
 
-    /// What depends on `(i_theta_h, column)` in the second coordinate: `[i_theta_h][90]`, with the columns of `phi_d`
-    /// and of `pi - phi_d` the same one.
+    /// The factor of the second coordinate that depends on `(i_theta_h, column)`: `[i_theta_h][90]`. `phi_d`
+    /// and `pi - phi_d` belong to the same column.
     #[must_use]
     pub fn scale(&self) -> &[f64] {
         &self.scale
     }
 
-    /// How many of the cells of `(i_theta_h, column)` have coordinates of their own; the cells above share those of
-    /// the last. Laid out like [`TableGeometry::scale`].
+    /// Number of cells of `(i_theta_h, column)` with coordinates of their own. The cells that follow along
+    /// `theta_d` share the coordinates of the last of these. Laid out like [`TableGeometry::scale`].
     #[must_use]
     pub fn distinct(&self) -> &[usize] {
         &self.distinct
     }
 
-    /// The largest value of the second coordinate: the horizon, at 1, in the warped box.
+    /// The largest value of the second coordinate: 1, the horizon, in the warped box; else infinity.
     #[must_use]
     pub fn limit(&self) -> f64 {
         self.limit

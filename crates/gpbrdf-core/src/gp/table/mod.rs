@@ -1,4 +1,4 @@
-//! From a process to every cell of a table.
+//! Evaluation of a process in every cell of a table.
 
 mod geometry;
 pub(crate) mod points;
@@ -16,7 +16,7 @@ pub struct MeanTable<'a> {
     pub first_channel: usize,
     /// Prior mean of each channel's target.
     pub offsets: [f64; 3],
-    /// From BRDF values to targets.
+    /// The map from BRDF values to targets.
     pub transform: Transform,
 }
 

@@ -1,4 +1,4 @@
-//! Predictive mean and sigma of any posterior on the whole table, direction by direction.
+//! Predictive mean and sigma of any posterior on the whole table, evaluated direction by direction.
 
 use rayon::prelude::*;
 
@@ -11,20 +11,21 @@ use crate::brdf::table::{
 use crate::gp::posterior::Posterior;
 use crate::gp::table::{MeanTable, to_f32};
 
-/// Sigma is computed at every `STEP`-th cell along each axis and interpolated between: it costs `n^2` a point and
-/// varies slowly.
+/// Sigma is computed in every `STEP`-th cell along each axis and interpolated between them, because it costs
+/// `n^2` per point and varies slowly.
 const STEP: usize = 3;
 
-/// Writes the predictive mean of every cell. In the warped box all cells of a column that are below the horizon are
-/// alike, and so are both halves of `phi_d` in a bilateral one: 0.56 M predictions instead of 1.46 M.
+/// Writes the predictive mean of every cell. In the warped box all cells of a column that are below the
+/// horizon have the same mean, and in a bilateral one both halves of `phi_d` do: this takes 0.56 million
+/// predictions instead of 1.46 million.
 pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanTable<'_>) {
     let space = posterior.space();
     let columns = if space.is_bilateral() { N_PHI_D / 2 } else { N_PHI_D };
     let channels = posterior.n_channels();
-    // One slab at a time, so that the points stay few.
+    // One slab at a time, which limits the memory for points.
     for (i, slab) in table.cells.chunks_mut(SLAB).enumerate() {
         let mut angles: Vec<HalfDiff> = Vec::with_capacity(SLAB);
-        // For each column, where its predictions start.
+        // Index of the first prediction of each column.
         let mut starts = Vec::with_capacity(columns + 1);
         for p in 0..columns {
             starts.push(angles.len());
@@ -54,7 +55,8 @@ pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanT
 }
 
 /// Latent standard deviation of every cell, by trilinear interpolation between the middles of blocks of
-/// `STEP^3` cells: `30 x 30 x 60` points, or half as many in a bilateral space. One plane for each variance.
+/// `STEP^3` cells: `30 x 30 x 60` points, or half as many in a bilateral space. Returns one plane per
+/// variance.
 pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Vec<f32>>> {
     let bilateral = posterior.space().is_bilateral();
     let shape = [N_THETA_H / STEP, N_THETA_D / STEP, N_PHI_D / STEP / if bilateral { 2 } else { 1 }];
@@ -86,7 +88,8 @@ pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Ve
     Ok(planes.collect())
 }
 
-/// The knots below and above a cell and the weight of the one above; the ends are held.
+/// Indices of the knots below and above a cell, and the weight of the knot above it. Beyond the outermost knots
+/// the value is constant.
 fn between(cell: usize, knots: usize) -> (usize, usize, f64) {
     let x = (cell as f64 - (STEP / 2) as f64) / STEP as f64;
     let x = x.clamp(0.0, (knots - 1) as f64);
