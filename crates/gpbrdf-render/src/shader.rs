@@ -49,6 +49,11 @@ pub(crate) enum Lookup {
     Filtered,
 }
 
+/// Whether `bake/shapes.wgsl` has the shape of this name.
+pub(crate) fn has_shape(name: &str) -> bool {
+    part::SHAPES.contains(&format!("fn {name}("))
+}
+
 /// The binding of the sampler for [`Lookup::Filtered`], in `material_filtered.wgsl`.
 pub(crate) const MATERIAL_SAMPLER: u32 = 10;
 

@@ -42,7 +42,8 @@ impl Shape {
                 }
                 exp_slice(r2);
             }
-            Self::Matern { .. } => {
+            // Shapes without a vector form.
+            _ => {
                 for v in r2 {
                     *v = self.value(*v);
                 }

@@ -43,7 +43,8 @@ impl Shape {
                     *slope = *value / (1.0 + r2 / (2.0 * alpha));
                 }
             }
-            Self::Matern { .. } => {
+            // Shapes without a vector form.
+            _ => {
                 for ((r2, value), slope) in r2.iter().zip(value).zip(slope) {
                     (*value, *slope) = self.value_and_slope(*r2);
                 }

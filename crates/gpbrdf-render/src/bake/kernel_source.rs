@@ -6,6 +6,7 @@ use gpbrdf_core::Shape;
 use gpbrdf_core::kernel::{Kernel, KernelBody};
 
 use crate::error::{Error, Result};
+use crate::shader;
 
 /// A kernel as a WGSL function, and the parameters that it reads.
 pub(super) struct KernelSource {
@@ -56,30 +57,22 @@ impl KernelSource {
     }
 }
 
-/// A call of the function of a shape in `bake/shapes.wgsl`.
+/// A call of the function that has the name of the shape.
 fn call(shape: Shape, r2: &str, parameter: &mut impl FnMut(f64) -> String) -> Result<String> {
-    Ok(match shape {
-        Shape::SquaredExponential => format!("squared_exponential({r2})"),
-        Shape::Matern12 => format!("matern_1_2({r2})"),
-        Shape::Matern32 => format!("matern_3_2({r2})"),
-        Shape::Matern52 => format!("matern_5_2({r2})"),
-        Shape::RationalQuadratic { alpha } => format!("rational_quadratic({r2}, {})", parameter(alpha)),
-        other => return Err(Error::NoShader { what: format!("the kernel {}", other.name()) }),
-    })
+    let name = shape.name();
+    if !shader::has_shape(name) {
+        return Err(Error::NoShader { what: format!("the kernel {name}") });
+    }
+    let alpha = shape.alpha().map_or_else(String::new, |alpha| format!(", {}", parameter(alpha)));
+    Ok(format!("{name}({r2}{alpha})"))
 }
 
 /// A kernel with every shape that has a shader, for the test of shaders.
 #[cfg(test)]
 pub(crate) fn every_shape() -> (String, usize) {
-    let shapes = [
-        Shape::SquaredExponential,
-        Shape::RationalQuadratic { alpha: 1.0 },
-        Shape::Matern12,
-        Shape::Matern32,
-        Shape::Matern52,
-    ];
-    let mut kernel = Kernel::ard(1.0, shapes[0], &[1.0; 3]);
-    kernel.terms.extend(shapes[1..].iter().flat_map(|&shape| Kernel::ard(1.0, shape, &[1.0; 3]).terms));
+    let shapes = Shape::ALL.into_iter().filter(|shape| shader::has_shape(shape.name()));
+    let terms = shapes.flat_map(|shape| Kernel::ard(1.0, shape, &[1.0; 3]).terms).collect();
+    let kernel = Kernel { terms, ..Kernel::ard(1.0, Shape::Matern52, &[1.0; 3]) };
     let source = KernelSource::new(&kernel).unwrap();
     (source.text, source.parameters.len())
 }
