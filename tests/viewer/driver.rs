@@ -180,5 +180,6 @@ pub(crate) fn crop(picture: &image::RgbaImage, rect: egui::Rect) -> image::RgbaI
 /// Width, height and pixels of an EXR file.
 pub(crate) fn read_exr(path: &Path) -> (usize, usize, Vec<[f32; 3]>) {
     let picture = gpbrdf_core::formats::read_environment(path).unwrap();
-    (picture.width(), picture.height(), picture.pixels().to_vec())
+    let raster = picture.raster();
+    (raster.width(), raster.height(), raster.pixels().to_vec())
 }

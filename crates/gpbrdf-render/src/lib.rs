@@ -77,7 +77,7 @@ pub use scene::gbuffer::Geometry;
 pub use scene::light::{EnvironmentLight, Light};
 pub use scene::mesh::{MAX_TRIANGLES, Mesh};
 pub use scene::obj::read_obj;
-pub use scene::renderer::{LinearPicture, Renderer};
+pub use scene::renderer::{LinearPicture, LinearPixel, Renderer};
 pub use scene::shade::{Sampling, ShadingOptions};
 pub use shader::{LOOKUP_WGSL, evaluate_wgsl};
 pub use texture::{BrdfTexture, Precision};

@@ -1,5 +1,5 @@
-//! Utilities without a subject of their own: errors, files written whole, random numbers, vector
-//! instructions, half precision, linear algebra, numbers for people.
+//! Utilities without a subject of their own: errors, files written whole, grids of pixels, random numbers,
+//! vector instructions, half precision, linear algebra, numbers for people.
 
 pub(crate) mod atomic_file;
 pub(crate) mod error;
@@ -7,8 +7,10 @@ pub(crate) mod f16;
 pub(crate) mod linalg;
 pub mod number;
 pub(crate) mod random;
+pub(crate) mod raster;
 pub(crate) mod simd;
 
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
 pub use error::{Error, Result};
 pub use random::{SplitMix64, golden_ratio_subset};
+pub use raster::Raster;

@@ -118,7 +118,7 @@ pub fn sphere_figure(
     if let Some(truth) = truth {
         let found = psnr(truth, prediction, exposure)?;
         shown = format!("PSNR {:.1} dB", psnr_env.unwrap_or(found));
-        let pairs = prediction.pixels().iter().zip(truth.pixels());
+        let pairs = prediction.raster().pixels().iter().zip(truth.raster().pixels());
         let gap: Vec<f64> = pairs.map(|(a, b)| exposed_difference(wide(a), wide(b), exposure)).collect();
         let limit = round_limit(&gap, truth.mask());
         let colours = disc_by_index(truth, |i| Colormap::Diverging.at(0.5 + 0.5 * gap[i] / limit));
@@ -195,7 +195,7 @@ fn compose(title: &str, panels: &[Panel], axes: Option<&Axes>, note: &str) -> Pi
     }
     let texts = Picture::text_width(title, SCALE).max(Picture::text_width(note, SCALE));
     let width = right.max(left + texts) + MARGIN;
-    let mut canvas = Picture::new(width, bottom + MARGIN, BACKGROUND);
+    let mut canvas = Picture::filled(width, bottom + MARGIN, BACKGROUND);
     canvas.text(left as i64, MARGIN as i64, SCALE, INK, title);
     canvas.text(left as i64, note_top as i64, SCALE, FAINT, note);
     for (i, (panel, &x)) in panels.iter().zip(&places).enumerate() {
@@ -277,14 +277,15 @@ fn centred(canvas: &mut Picture, x: usize, y: usize, colour: Rgb8, text: &str) {
 
 /// A sphere picture on the figure's background. Pixels on the rim are mixed with it by their coverage.
 fn disc(image: &Image, colour: impl Fn(Rgb) -> Rgb8) -> Picture {
-    disc_by_index(image, |i| colour(wide(&image.pixels()[i])))
+    disc_by_index(image, |i| colour(wide(&image.raster().pixels()[i])))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a mean of two u8 is one")]
 fn disc_by_index(image: &Image, colour: impl Fn(usize) -> Rgb8) -> Picture {
-    let (width, height) = (image.width() as f64, image.height() as f64);
-    Picture::from_fn(image.width(), image.height(), |column, row| {
-        let i = row * image.width() + column;
+    let (columns, rows) = (image.raster().width(), image.raster().height());
+    let (width, height) = (columns as f64, rows as f64);
+    Picture::from_fn(columns, rows, |column, row| {
+        let i = row * columns + column;
         if !image.mask()[i] {
             return BACKGROUND;
         }

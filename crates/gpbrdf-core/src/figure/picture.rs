@@ -8,6 +8,7 @@ use image::ImageEncoder as _;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
+use crate::base::raster::Raster;
 use crate::brdf::Rgb;
 
 /// An sRGB colour, 8 bits per channel.
@@ -17,44 +18,9 @@ pub type Rgb8 = [u8; 3];
 const THETA: [u8; 8] = [0x1c, 0x36, 0x36, 0x3e, 0x36, 0x36, 0x1c, 0x00];
 
 /// An 8-bit sRGB picture, rows from top to bottom. Drawing outside of it has no effect.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
-    width: usize,
-    height: usize,
-    pixels: Vec<Rgb8>,
-}
+pub type Picture = Raster<Rgb8>;
 
 impl Picture {
-    /// A picture of one colour.
-    #[must_use]
-    pub fn new(width: usize, height: usize, colour: Rgb8) -> Self {
-        Self { width, height, pixels: vec![colour; width * height] }
-    }
-
-    /// A picture of `colour(column, row)`.
-    pub fn from_fn(width: usize, height: usize, colour: impl Fn(usize, usize) -> Rgb8) -> Self {
-        let pixels = (0..width * height).map(|i| colour(i % width, i / width)).collect();
-        Self { width, height, pixels }
-    }
-
-    /// Number of columns.
-    #[must_use]
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Number of rows.
-    #[must_use]
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
-    /// The pixels, rows from top to bottom.
-    #[must_use]
-    pub fn pixels(&self) -> &[Rgb8] {
-        &self.pixels
-    }
-
     /// Fills a rectangle.
     pub fn fill(&mut self, x: i64, y: i64, width: usize, height: usize, colour: Rgb8) {
         for row in 0..height {
@@ -66,8 +32,8 @@ impl Picture {
 
     /// Copies `other` with its upper left corner at `(x, y)`.
     pub fn blit(&mut self, x: i64, y: i64, other: &Self) {
-        for (i, &colour) in other.pixels.iter().enumerate() {
-            self.set(x + (i % other.width) as i64, y + (i / other.width) as i64, colour);
+        for (i, &colour) in other.pixels().iter().enumerate() {
+            self.set(x + (i % other.width()) as i64, y + (i / other.width()) as i64, colour);
         }
     }
 
@@ -104,9 +70,9 @@ impl Picture {
         let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
         image::codecs::png::PngEncoder::new(&mut *out)
             .write_image(
-                self.pixels.as_flattened(),
-                side(self.width)?,
-                side(self.height)?,
+                self.pixels().as_flattened(),
+                side(self.width())?,
+                side(self.height())?,
                 image::ExtendedColorType::Rgb8,
             )
             .map_err(|error| match error {
@@ -129,8 +95,9 @@ impl Picture {
 
     fn set(&mut self, x: i64, y: i64, colour: Rgb8) {
         let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
-        if x < self.width && y < self.height {
-            self.pixels[y * self.width + x] = colour;
+        let width = self.width();
+        if x < width && y < self.height() {
+            self.pixels_mut()[y * width + x] = colour;
         }
     }
 }
@@ -218,7 +185,7 @@ mod tests {
         let back = image::load_from_memory(&bytes).unwrap().into_rgb8();
         assert_eq!((back.width(), back.height()), (5, 3));
         assert_eq!(back.into_raw(), picture.pixels().as_flattened());
-        assert!(Picture::new(0, 0, [0; 3]).write_png(&mut bytes).is_err());
+        assert!(Picture::filled(0, 0, [0; 3]).write_png(&mut bytes).is_err());
         let folder = tempfile::tempdir().unwrap();
         assert!(picture.save_png(folder.path()).is_err());
     }
@@ -227,7 +194,7 @@ mod tests {
     fn text_stays_within_its_width_and_the_picture() {
         for text in ["Wy_", "\u{3b8}_h", "0.5\u{b0}", "\u{4e2d}"] {
             let width = Picture::text_width(text, 2);
-            let mut picture = Picture::new(width + 20, 40, [0; 3]);
+            let mut picture = Picture::filled(width + 20, 40, [0; 3]);
             picture.text(10, 10, 2, [255; 3], text);
             let lit = |i: usize| picture.pixels()[i] != [0; 3];
             let columns: Vec<_> =

@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use crate::base::error::{Error, Result};
+use crate::base::raster::Raster;
 use crate::formats::exr;
 use crate::judge::Environment;
 
@@ -37,19 +38,18 @@ pub fn read_environment(path: impl AsRef<Path>) -> Result<Environment> {
         expected: expected.to_owned(),
         found,
     };
-    let (width, height, mut pixels) =
-        decoded.map_err(|found| broken("a latitude-longitude map in RGB", found))?;
-    for value in pixels.iter_mut().flatten() {
+    let mut raster = decoded.map_err(|found| broken("a latitude-longitude map in RGB", found))?;
+    for value in raster.pixels_mut().iter_mut().flatten() {
         // `max` is not used, since it would turn NaN into 0.
         if *value < 0.0 {
             *value = 0.0;
         }
     }
-    Environment::new(width, height, pixels).map_err(|error| broken("finite radiance", error.to_string()))
+    Environment::new(raster).map_err(|error| broken("finite radiance", error.to_string()))
 }
 
-/// Width, height and pixels, or a description of what is wrong.
-type Decoded = Result<(usize, usize, Vec<[f32; 3]>), String>;
+/// The pixels, or a description of what is wrong.
+type Decoded = Result<Raster<[f32; 3]>, String>;
 
 fn decode_hdr(bytes: &[u8]) -> Decoded {
     let image = image::ImageReader::with_format(Cursor::new(bytes), image::ImageFormat::Hdr)
@@ -57,7 +57,7 @@ fn decode_hdr(bytes: &[u8]) -> Decoded {
         .map_err(|error| error.to_string())?
         .into_rgb32f();
     let (width, height) = (image.width() as usize, image.height() as usize);
-    Ok((width, height, image.pixels().map(|p| p.0).collect()))
+    Raster::new(width, height, image.pixels().map(|p| p.0).collect()).map_err(|error| error.to_string())
 }
 
 fn decode_exr(bytes: &[u8]) -> Decoded {
@@ -83,7 +83,8 @@ fn decode_exr(bytes: &[u8]) -> Decoded {
         .from_buffered(Cursor::new(bytes))
         .map_err(|error| error.to_string())?;
     let size = image.layer_data.size;
-    Ok((size.width(), size.height(), image.layer_data.channel_data.pixels.1))
+    let (_, pixels) = image.layer_data.channel_data.pixels;
+    Raster::new(size.width(), size.height(), pixels).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
@@ -99,8 +100,7 @@ mod tests {
         let file = std::fs::File::create(&hdr).unwrap();
         image::codecs::hdr::HdrEncoder::new(file).encode(&rgb, 2, 2).unwrap();
         let map = read_environment(&hdr).unwrap();
-        assert_eq!((map.width(), map.height()), (2, 2));
-        assert_eq!(map.pixels(), pixels);
+        assert_eq!(map.raster(), &Raster::new(2, 2, pixels.to_vec()).unwrap());
 
         let exr = folder.path().join("map.exr");
         ::exr::prelude::write_rgb_file(&exr, 2, 2, |x, y| {
@@ -108,7 +108,7 @@ mod tests {
             (r, g, if x == 0 && y == 1 { -1.0 } else { b })
         })
         .unwrap();
-        assert_eq!(read_environment(&exr).unwrap().pixels(), pixels);
+        assert_eq!(read_environment(&exr).unwrap().raster().pixels(), pixels);
 
         let bytes = std::fs::read(&hdr).unwrap();
         std::fs::write(&hdr, &bytes[..bytes.len() - 3]).unwrap();

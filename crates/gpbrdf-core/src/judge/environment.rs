@@ -10,14 +10,13 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Vector3;
 
 use crate::base::error::{Error, Result};
+use crate::base::raster::Raster;
 use crate::brdf::Rgb;
 
-/// A latitude-longitude map of radiance, linear RGB, rows from top to bottom.
+/// A latitude-longitude map of radiance, linear RGB, finite and not negative.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
-    width: usize,
-    height: usize,
-    pixels: Vec<[f32; 3]>,
+    raster: Raster<[f32; 3]>,
 }
 
 /// One rectangular patch of an [`Environment`].
@@ -50,21 +49,21 @@ const STUDIO_HORIZON: Rgb = [0.42, 0.42, 0.44];
 const STUDIO_FLOOR: Rgb = [0.050, 0.042, 0.036];
 
 impl Environment {
-    /// A map of `width * height` pixels, rows from top to bottom.
+    /// A map of radiance.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] when a side is 0, the number of pixels is not `width * height`, or a value
-    /// is negative or not finite.
-    pub fn new(width: usize, height: usize, pixels: Vec<[f32; 3]>) -> Result<Self> {
-        if width == 0 || height == 0 || width.checked_mul(height) != Some(pixels.len()) {
-            let expected = format!("{width} x {height} pixels, at least one");
-            return Err(Error::argument("environment", expected, pixels.len()));
+    /// [`Error::InvalidArgument`] when there are no pixels, or a value is negative or not finite.
+    pub fn new(raster: Raster<[f32; 3]>) -> Result<Self> {
+        let (width, pixels) = (raster.width(), raster.pixels());
+        if pixels.is_empty() {
+            let found = format!("{width} x {}", raster.height());
+            return Err(Error::argument("environment", "at least one pixel", found));
         }
         if let Some(at) = pixels.iter().position(|p| p.iter().any(|&x| !(x >= 0.0 && x.is_finite()))) {
             let found = format!("{:?} at column {} of row {}", pixels[at], at % width, at / width);
             return Err(Error::argument("environment", "finite radiance, not negative", found));
         }
-        Ok(Self { width, height, pixels })
+        Ok(Self { raster })
     }
 
     /// The environment of the image metrics: a studio given by a formula, 192 x 96 pixels.
@@ -76,32 +75,18 @@ impl Environment {
     #[must_use]
     pub fn studio() -> Self {
         let (width, height) = (192, 96);
-        let pixels = (0..width * height)
-            .map(|i| {
-                let u = ((i % width) as f64 + 0.5) / width as f64;
-                let v = ((i / width) as f64 + 0.5) / height as f64;
-                narrow(studio_radiance(&lat_long(u, v)))
-            })
-            .collect();
-        Self { width, height, pixels }
+        let raster = Raster::from_fn(width, height, |column, row| {
+            let u = (column as f64 + 0.5) / width as f64;
+            let v = (row as f64 + 0.5) / height as f64;
+            narrow(studio_radiance(&lat_long(u, v)))
+        });
+        Self { raster }
     }
 
-    /// Number of columns.
+    /// Radiance, linear RGB.
     #[must_use]
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Number of rows.
-    #[must_use]
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
-    /// Radiance, linear RGB, rows from top to bottom.
-    #[must_use]
-    pub fn pixels(&self) -> &[[f32; 3]] {
-        &self.pixels
+    pub fn raster(&self) -> &Raster<[f32; 3]> {
+        &self.raster
     }
 
     /// The map as `columns x rows` patches, row by row. The radiance of a patch is the mean over its pixels,
@@ -109,12 +94,12 @@ impl Environment {
     /// `sum radiance solid_angle` is unchanged.
     #[must_use]
     pub fn average_to(&self, columns: usize, rows: usize) -> Vec<EnvDirection> {
-        let across: Vec<_> = (0..columns).map(|i| overlaps(i, columns, self.width)).collect();
+        let across: Vec<_> = (0..columns).map(|i| overlaps(i, columns, self.raster.width())).collect();
         let mut patches = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             let (top, bottom) = (row as f64 / rows as f64, (row + 1) as f64 / rows as f64);
             let band = (PI * top).cos() - (PI * bottom).cos();
-            let down: Vec<_> = overlaps(row, rows, self.height)
+            let down: Vec<_> = overlaps(row, rows, self.raster.height())
                 .into_iter()
                 .map(|(y, low, high)| (y, (PI * low).cos() - (PI * high).cos()))
                 .collect();
@@ -125,7 +110,7 @@ impl Environment {
                     for &(x, low, high) in spans {
                         let weight = weight_y * (high - low);
                         total += weight;
-                        let pixel = self.pixels[y * self.width + x];
+                        let pixel = self.raster.at(x, y);
                         for c in 0..3 {
                             sum[c] += weight * f64::from(pixel[c]);
                         }
@@ -196,13 +181,13 @@ mod tests {
     fn patches_fill_the_sphere_and_keep_the_flux() {
         // 50 x 23 pixels are divided evenly by neither 48 columns nor 24 rows.
         let pixels = (0..50 * 23).map(|i| [(i % 7) as f32, (i % 50) as f32, (i / 50) as f32]).collect();
-        let map = Environment::new(50, 23, pixels).unwrap();
+        let map = Environment::new(Raster::new(50, 23, pixels).unwrap()).unwrap();
         let patches = map.average_to(48, 24);
         let whole: f64 = patches.iter().map(|p| p.solid_angle).sum();
         assert!((whole - 4.0 * PI).abs() < 1e-12);
         for c in 0..3 {
             let mut flux = 0.0;
-            for (i, pixel) in map.pixels().iter().enumerate() {
+            for (i, pixel) in map.raster().pixels().iter().enumerate() {
                 let (top, bottom) = ((i / 50) as f64 / 23.0 * PI, (i / 50 + 1) as f64 / 23.0 * PI);
                 flux += f64::from(pixel[c]) * (top.cos() - bottom.cos()) * TAU / 50.0;
             }

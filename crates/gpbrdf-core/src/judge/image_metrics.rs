@@ -136,10 +136,17 @@ pub fn ssim(truth: &Image, prediction: &Image, exposure: f64) -> Result<f64> {
     same_size(truth, prediction)?;
     let plane = |image: &Image, c: usize| -> Vec<f64> {
         let shown = |x: f32| clip(f64::from(x) * exposure).powf(1.0 / 2.2);
-        image.pixels().iter().zip(image.mask()).map(|(p, &m)| if m { shown(p[c]) } else { 0.0 }).collect()
+        image
+            .raster()
+            .pixels()
+            .iter()
+            .zip(image.mask())
+            .map(|(p, &m)| if m { shown(p[c]) } else { 0.0 })
+            .collect()
     };
-    let sum: f64 =
-        (0..3).map(|c| mean_ssim(&plane(truth, c), &plane(prediction, c), truth.mask(), truth.width())).sum();
+    let sum: f64 = (0..3)
+        .map(|c| mean_ssim(&plane(truth, c), &plane(prediction, c), truth.mask(), truth.raster().width()))
+        .sum();
     Ok(sum / 3.0)
 }
 
@@ -162,12 +169,13 @@ fn clip(x: f64) -> f64 {
 
 /// The channels of the sphere's pixels, as pairs of both pictures.
 fn pairs<'a>(a: &'a Image, b: &'a Image) -> impl Iterator<Item = (f64, f64)> + 'a {
-    let both = a.pixels().iter().zip(b.pixels()).zip(a.mask());
+    let both = a.raster().pixels().iter().zip(b.raster().pixels()).zip(a.mask());
     both.filter(|(_, inside)| **inside)
         .flat_map(|((a, b), _)| (0..3).map(move |c| (f64::from(a[c]), f64::from(b[c]))))
 }
 
 fn same_size(a: &Image, b: &Image) -> Result<()> {
+    let (a, b) = (a.raster(), b.raster());
     if (a.width(), a.height()) == (b.width(), b.height()) {
         return Ok(());
     }
@@ -206,6 +214,7 @@ pub(crate) mod decibel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::raster::Raster;
 
     /// A disc that is `size` pixels wide.
     fn picture(size: usize, f: impl Fn(usize) -> [f32; 3]) -> Image {
@@ -215,7 +224,7 @@ mod tests {
                 c(i % size).hypot(c(i / size)) < 1.0
             })
             .collect();
-        Image::new(size, size, (0..size * size).map(f).collect(), mask).unwrap()
+        Image::new(Raster::from_fn(size, size, |x, y| f(y * size + x)), mask).unwrap()
     }
 
     #[test]
@@ -251,11 +260,11 @@ mod tests {
         assert!((ssim(&a, &a, 1.0).unwrap() - 1.0).abs() < 1e-12);
         let noisy = |amount: f32| {
             let mut i = 0;
-            let pixels = a.pixels().iter().map(|p| {
+            let raster = a.raster().map(|p| {
                 i += 1;
                 p.map(|x| x + amount * ((i as f32 * 0.618_034).fract() - 0.5))
             });
-            Image::new(48, 48, pixels.collect(), a.mask().to_vec()).unwrap()
+            Image::new(raster, a.mask().to_vec()).unwrap()
         };
         let (little, much) = (ssim(&a, &noisy(0.02), 1.0).unwrap(), ssim(&a, &noisy(0.3), 1.0).unwrap());
         assert!(1.0 > little && little > 0.9 && little > much + 0.1, "{little} {much}");

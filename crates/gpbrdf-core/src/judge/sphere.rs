@@ -10,6 +10,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
+use crate::base::raster::Raster;
 use crate::brdf::Rgb;
 use crate::brdf::angles::GRAZING_COSINE;
 use crate::brdf::angles::HalfDiff;
@@ -113,11 +114,11 @@ pub fn render_sphere(
         })
         .collect();
     let images = (0..tables.len()).map(|t| {
-        let mut pixels = vec![[0.0; 3]; size * size];
+        let mut raster = Raster::filled(size, size, [0.0; 3]);
         for (i, radiance) in shaded.iter().flatten() {
-            pixels[*i] = narrow(radiance[t]);
+            raster.pixels_mut()[*i] = narrow(radiance[t]);
         }
-        Image { width: size, height: size, pixels, mask: mask.clone() }
+        Image { raster, mask: mask.clone() }
     });
     Ok(images.collect())
 }
@@ -289,7 +290,7 @@ mod tests {
     #[test]
     fn a_lambert_sphere_in_constant_light_has_the_closed_form() {
         let table = BrdfTable::from_fn(|_| [0.5 / PI, 0.25 / PI, 0.0]);
-        let white = Environment::new(4, 2, vec![[2.0; 3]; 8]).unwrap();
+        let white = Environment::new(Raster::filled(4, 2, [2.0; 3])).unwrap();
         let images = render_env(&[&table, &table], &white, SPHERE_SIZE);
         assert_eq!(images.len(), 2);
         assert_eq!(images[0], images[1]);
@@ -325,12 +326,12 @@ mod tests {
             let turn = nalgebra::Rotation3::rotation_between(&normal, &Vector3::z()).unwrap();
             let (wi, wo) = (turn * light, turn * Vector3::z());
             let f = table.eval(&wi, &wo);
-            for (f, found) in f.iter().zip(image.pixels()[row * 96 + column]) {
+            for (f, found) in f.iter().zip(image.raster().at(column, row)) {
                 let expected = PI * f * normal.dot(&light);
-                let found = f64::from(found);
+                let found = f64::from(*found);
                 assert!((found / expected - 1.0).abs() < 1e-5, "{row} {column}: {found} {expected}");
             }
         }
-        assert_eq!(image.pixels()[80 * 96 + 15], [0.0; 3]);
+        assert_eq!(*image.raster().at(15, 80), [0.0; 3]);
     }
 }

@@ -4,6 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::Vec3;
 use gpbrdf_core::Environment;
+use gpbrdf_core::base::Raster;
 use gpbrdf_core::judge::{EnvDirection, POINT_LIGHT};
 
 use super::colour::luminance;
@@ -72,10 +73,8 @@ impl Light {
 /// Rendering", 3rd edition, section 14.2.4, with bands of equal cosine in place of the factor `sin theta`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentLight {
-    width: usize,
-    height: usize,
     /// Radiance and, last, density in 1/sr.
-    texels: Vec<[f32; 4]>,
+    texels: Raster<[f32; 4]>,
     /// `height + 1` values of rows, then `width + 1` of each row's pixels; each from 0 to 1.
     cumulative: Vec<f32>,
 }
@@ -85,12 +84,13 @@ impl EnvironmentLight {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "single precision is the shader's")]
     pub fn new(environment: &Environment) -> Self {
-        let (width, height) = (environment.width(), environment.height());
+        let radiance = environment.raster();
+        let (width, height) = (radiance.width(), radiance.height());
         let band = |row: usize| {
             let edge = |i: usize| (PI * i as f64 / height as f64).cos();
             edge(row) - edge(row + 1)
         };
-        let rows: Vec<&[[f32; 3]]> = environment.pixels().chunks_exact(width).collect();
+        let rows: Vec<&[[f32; 3]]> = radiance.pixels().chunks_exact(width).collect();
         let flux = |row: &[[f32; 3]]| row.iter().map(luminance).sum::<f64>();
         let black = !rows.iter().any(|row| flux(row) > 0.0);
         let weights = rows.iter().enumerate().map(|(y, row)| band(y) * if black { 1.0 } else { flux(row) });
@@ -100,32 +100,17 @@ impl EnvironmentLight {
         }
         // The density of the rounded shares, so that estimates stay unbiased.
         let step = |i: usize| f64::from(cumulative[i + 1]) - f64::from(cumulative[i]);
-        let texels = (0..width * height)
-            .map(|i| {
-                let (x, y) = (i % width, i / width);
-                let share = step(y) * step(height + 1 + y * (width + 1) + x);
-                let [r, g, b] = environment.pixels()[i];
-                [r, g, b, (share / (band(y) * TAU / width as f64)) as f32]
-            })
-            .collect();
-        Self { width, height, texels, cumulative }
+        let texels = Raster::from_fn(width, height, |x, y| {
+            let share = step(y) * step(height + 1 + y * (width + 1) + x);
+            let [r, g, b] = *radiance.at(x, y);
+            [r, g, b, (share / (band(y) * TAU / width as f64)) as f32]
+        });
+        Self { texels, cumulative }
     }
 
-    /// Number of columns of the map.
+    /// Radiance and density in 1/sr of every pixel.
     #[must_use]
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Number of rows of the map.
-    #[must_use]
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
-    /// Radiance and density in 1/sr of every pixel, rows from top to bottom.
-    #[must_use]
-    pub fn texels(&self) -> &[[f32; 4]] {
+    pub fn texels(&self) -> &Raster<[f32; 4]> {
         &self.texels
     }
 
@@ -174,10 +159,11 @@ mod tests {
         let light = EnvironmentLight::new(&studio);
         let mut whole = 0.0;
         let mut ratio = Vec::new();
-        for (i, texel) in light.texels().iter().enumerate() {
-            let edge = |y: usize| (PI * y as f64 / light.height() as f64).cos();
-            let y = i / light.width();
-            let solid_angle = (edge(y) - edge(y + 1)) * TAU / light.width() as f64;
+        let texels = light.texels();
+        for (i, texel) in texels.pixels().iter().enumerate() {
+            let edge = |y: usize| (PI * y as f64 / texels.height() as f64).cos();
+            let y = i / texels.width();
+            let solid_angle = (edge(y) - edge(y + 1)) * TAU / texels.width() as f64;
             whole += f64::from(texel[3]) * solid_angle;
             ratio.push(f64::from(texel[3]) / luminance(&[texel[0], texel[1], texel[2]]));
         }
@@ -190,13 +176,12 @@ mod tests {
 
     #[test]
     fn black_maps_and_black_rows_are_drawn_from_uniformly() {
-        let black = EnvironmentLight::new(&Environment::new(4, 2, vec![[0.0; 3]; 8]).unwrap());
-        assert!(black.texels().iter().all(|t| (f64::from(t[3]) * 4.0 * PI - 1.0).abs() < 1e-6));
-        let mut pixels = vec![[0.0; 3]; 8];
-        pixels[6] = [1.0; 3];
-        let lamp = EnvironmentLight::new(&Environment::new(4, 2, pixels).unwrap());
-        assert_eq!(lamp.texels()[0][3], 0.0);
-        assert!((f64::from(lamp.texels()[6][3]) * PI / 2.0 - 1.0).abs() < 1e-6);
+        let black = EnvironmentLight::new(&Environment::new(Raster::filled(4, 2, [0.0; 3])).unwrap());
+        assert!(black.texels().pixels().iter().all(|t| (f64::from(t[3]) * 4.0 * PI - 1.0).abs() < 1e-6));
+        let map = Raster::from_fn(4, 2, |x, y| if (x, y) == (2, 1) { [1.0; 3] } else { [0.0; 3] });
+        let lamp = EnvironmentLight::new(&Environment::new(map).unwrap());
+        assert_eq!(lamp.texels().at(0, 0)[3], 0.0);
+        assert!((f64::from(lamp.texels().at(2, 1)[3]) * PI / 2.0 - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The renderer of scenes, which a viewer shows or a program writes to files.
 
 use glam::Vec2;
+use gpbrdf_core::base::Raster;
 use gpbrdf_core::judge::Image;
 
 use super::camera::Camera;
@@ -78,32 +79,40 @@ impl Frame {
     }
 }
 
-/// Means of a picture's samples, in linear RGB; rows from top to bottom.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LinearPicture {
-    /// Number of columns.
-    pub width: usize,
-    /// Number of rows.
-    pub height: usize,
+/// Means of one pixel's samples, in linear RGB.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinearPixel {
     /// Radiance of the truth where an object is; black elsewhere.
-    pub truth: Vec<[f32; 3]>,
+    pub truth: [f32; 3],
     /// Radiance of the prediction where an object is; black elsewhere.
-    pub prediction: Vec<[f32; 3]>,
+    pub prediction: [f32; 3],
     /// Standard deviation of the prediction's target: the mean over the samples, weighted by reflected
     /// luminance.
-    pub sigma: Vec<f32>,
-    /// The share of each pixel that objects cover, in `[0, 1]`.
-    pub coverage: Vec<f32>,
+    pub sigma: f32,
+    /// The share of the pixel that objects cover, in `[0, 1]`.
+    pub coverage: f32,
+}
+
+/// Means of a picture's samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearPicture {
+    raster: Raster<LinearPixel>,
 }
 
 impl LinearPicture {
+    /// The means of each pixel.
+    #[must_use]
+    pub fn raster(&self) -> &Raster<LinearPixel> {
+        &self.raster
+    }
+
     /// `exposure (prediction - truth)`, the mean of the channels, of every pixel: positive where the
     /// prediction is too bright. [`Show::Difference`](crate::Show::Difference) shows the same. An exposure of
     /// 1 gives the difference of radiance.
     #[must_use]
     pub fn difference(&self, exposure: f32) -> Vec<f32> {
-        let mean_gap = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|c| b[c] - a[c]).sum::<f32>() / 3.0;
-        self.truth.iter().zip(&self.prediction).map(|pair| exposure * mean_gap(pair)).collect()
+        let mean_gap = |p: &LinearPixel| (0..3).map(|c| p.prediction[c] - p.truth[c]).sum::<f32>() / 3.0;
+        self.raster.pixels().iter().map(|pixel| exposure * mean_gap(pixel)).collect()
     }
 
     /// Truth and prediction as images for the metrics of `gpbrdf-core`. Their masks hold the pixels that an
@@ -112,9 +121,9 @@ impl LinearPicture {
     /// # Errors
     /// Those of [`Image::new`].
     pub fn images(&self) -> Result<(Image, Image)> {
-        let mask: Vec<bool> = self.coverage.iter().map(|&share| share > 0.0).collect();
-        let image = |pixels: &[[f32; 3]]| Image::new(self.width, self.height, pixels.to_vec(), mask.clone());
-        Ok((image(&self.truth)?, image(&self.prediction)?))
+        let mask: Vec<bool> = self.raster.pixels().iter().map(|pixel| pixel.coverage > 0.0).collect();
+        let truth = Image::new(self.raster.map(|pixel| pixel.truth), mask.clone())?;
+        Ok((truth, Image::new(self.raster.map(|pixel| pixel.prediction), mask)?))
     }
 }
 
@@ -371,33 +380,23 @@ impl Renderer {
     #[expect(clippy::cast_precision_loss, reason = "at most 2^24 samples")]
     pub fn read_linear(&self) -> Result<LinearPicture> {
         let [width, height] = self.size().map(|side| side as usize);
-        let pixels = width * height;
-        let mut picture = LinearPicture {
-            width,
-            height,
-            truth: Vec::with_capacity(pixels),
-            prediction: Vec::with_capacity(pixels),
-            sigma: Vec::with_capacity(pixels),
-            coverage: Vec::with_capacity(pixels),
-        };
-        if self.samples == 0 {
-            picture.truth.resize(pixels, [0.0; 3]);
-            picture.prediction.resize(pixels, [0.0; 3]);
-            picture.sigma.resize(pixels, 0.0);
-            picture.coverage.resize(pixels, 0.0);
-            return Ok(picture);
+        let mut raster = Raster::filled(width, height, LinearPixel::default());
+        if self.samples > 0 {
+            let bytes = self.context.read_buffer(&self.frame.sums)?;
+            let scale = 1.0 / self.samples as f32;
+            let sums = bytes.chunks_exact(size_of::<PixelSums>());
+            for (pixel, bytes) in raster.pixels_mut().iter_mut().zip(sums) {
+                let sums: PixelSums = bytemuck::pod_read_unaligned(bytes);
+                let light = narrow(luminance(&sums.prediction));
+                *pixel = LinearPixel {
+                    truth: sums.truth.map(|x| x * scale),
+                    prediction: sums.prediction.map(|x| x * scale),
+                    sigma: if light > 0.0 { sums.weighted_sigma / light } else { 0.0 },
+                    coverage: (sums.hits * scale).min(1.0),
+                };
+            }
         }
-        let bytes = self.context.read_buffer(&self.frame.sums)?;
-        let scale = 1.0 / self.samples as f32;
-        for bytes in bytes.chunks_exact(size_of::<PixelSums>()).take(pixels) {
-            let sums: PixelSums = bytemuck::pod_read_unaligned(bytes);
-            picture.truth.push(sums.truth.map(|x| x * scale));
-            picture.prediction.push(sums.prediction.map(|x| x * scale));
-            let light = narrow(luminance(&sums.prediction));
-            picture.sigma.push(if light > 0.0 { sums.weighted_sigma / light } else { 0.0 });
-            picture.coverage.push((sums.hits * scale).min(1.0));
-        }
-        Ok(picture)
+        Ok(LinearPicture { raster })
     }
 
     /// The G-buffer of the latest pass.

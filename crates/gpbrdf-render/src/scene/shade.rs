@@ -1,6 +1,7 @@
 //! Progressive shading of a G-buffer with two materials.
 
 use bytemuck::NoUninit;
+use gpbrdf_core::base::Raster;
 
 use super::camera::{Camera, Projection};
 use super::gbuffer::GBuffer;
@@ -93,10 +94,11 @@ pub(crate) struct EnvironmentBuffers {
 impl EnvironmentBuffers {
     pub(crate) fn new(context: &Context, light: &Light) -> Result<Self> {
         const WHAT: &str = "environment map";
-        let (width, height, texels, cumulative) = match light {
-            Light::Environment(map) => (map.width(), map.height(), map.texels(), map.cumulative()),
-            _ => (1, 1, &[[0.0; 4]][..], &[0.0; 4][..]),
+        let (texels, cumulative) = match light {
+            Light::Environment(map) => (map.texels(), map.cumulative()),
+            _ => (&Raster::filled(1, 1, [0.0; 4]), &[0.0; 4][..]),
         };
+        let (width, height) = (texels.width(), texels.height());
         let most = context.device().limits().max_texture_dimension_2d;
         let side = |n: usize| u32::try_from(n).ok().filter(|&n| n <= most);
         let (Some(columns), Some(rows)) = (side(width), side(height)) else {
@@ -125,7 +127,7 @@ impl EnvironmentBuffers {
             };
             context.queue().write_texture(
                 texture.as_image_copy(),
-                bytemuck::cast_slice(texels),
+                bytemuck::cast_slice(texels.pixels()),
                 layout,
                 size,
             );

@@ -2,12 +2,13 @@
 
 use std::f32::consts::PI;
 
+use gpbrdf_core::base::Raster;
 use gpbrdf_core::judge::{render_env, render_point};
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::twin::{TwinLight, shade_on_cpu};
 use gpbrdf_render::{
-    Background, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
-    Renderer, Sampling, ShadingOptions, Show, glam,
+    Background, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, LinearPixel, Mesh,
+    Precision, Renderer, Sampling, ShadingOptions, Show, glam,
 };
 
 use crate::fixtures::{glossy, rippled, studio, upload};
@@ -39,6 +40,14 @@ fn widened(pixels: &[[f32; 3]]) -> Vec<[f64; 3]> {
     pixels.iter().map(|p| p.map(f64::from)).collect()
 }
 
+fn truth(picture: &LinearPicture) -> Vec<[f32; 3]> {
+    picture.raster().pixels().iter().map(|pixel| pixel.truth).collect()
+}
+
+fn prediction(picture: &LinearPicture) -> Vec<[f32; 3]> {
+    picture.raster().pixels().iter().map(|pixel| pixel.prediction).collect()
+}
+
 fn the_sphere_under_a_point_light_is_the_core_s(context: &Context) {
     let tables = [BrdfTable::from_fn(glossy), BrdfTable::from_fn(rippled)];
     let mut renderer = Renderer::new(context, [96, 96]).unwrap();
@@ -47,10 +56,10 @@ fn the_sphere_under_a_point_light_is_the_core_s(context: &Context) {
     renderer.render_more(1).unwrap();
     let found = renderer.read_linear().unwrap();
     let expected = render_point(&[&tables[0], &tables[1]], 96);
-    let mask: Vec<bool> = found.coverage.iter().map(|&c| c > 0.0).collect();
+    let mask: Vec<bool> = found.raster().pixels().iter().map(|p| p.coverage > 0.0).collect();
     assert_eq!(mask, expected[0].mask());
-    for (found, expected) in [&found.truth, &found.prediction].into_iter().zip(&expected) {
-        let (worst, rms) = gaps(found, widened(expected.pixels()).iter(), 1.0);
+    for (found, expected) in [truth(&found), prediction(&found)].iter().zip(&expected) {
+        let (worst, rms) = gaps(found, widened(expected.raster().pixels()).iter(), 1.0);
         eprintln!("sphere, point light: worst {worst:.1e}, rms {rms:.1e}");
         assert!(worst < 2e-3, "{worst}");
     }
@@ -58,7 +67,7 @@ fn the_sphere_under_a_point_light_is_the_core_s(context: &Context) {
     renderer.set_shading(ShadingOptions { exact_lookup: false, ..ShadingOptions::of_metrics() }).unwrap();
     renderer.render_more(1).unwrap();
     let filtered = renderer.read_linear().unwrap();
-    let (worst, _) = gaps(&filtered.truth, widened(expected[0].pixels()).iter(), 1.0);
+    let (worst, _) = gaps(&truth(&filtered), widened(expected[0].raster().pixels()).iter(), 1.0);
     assert!(worst < 2e-2, "{worst}");
 }
 
@@ -85,7 +94,7 @@ fn meshes_under_direct_light_are_the_twin_s(context: &Context) {
                 assert!((normal.length() - 1.0).abs() < 1e-4, "{texel:?}");
             }
             let expected = shade_on_cpu(&texels, &camera, TwinLight::Direct(light), &[&table], 0.0).remove(0);
-            let (worst, rms) = gaps(&found.prediction, expected.iter(), 1.0);
+            let (worst, rms) = gaps(&prediction(&found), expected.iter(), 1.0);
             eprintln!("mesh: worst {worst:.1e}, rms {rms:.1e}");
             assert!(worst < 2e-3, "{worst}");
         }
@@ -124,22 +133,22 @@ fn the_three_strategies_agree_with_quadrature(context: &Context) {
         shade_on_cpu(&texels, &Camera::default(), coarse, &[&table], gpbrdf_core::brdf::GRAZING_COSINE)
             .remove(0);
     let core = render_env(&[&table], &environment, 20).remove(0);
-    let (worst, _) = gaps(core.pixels(), coarse.iter(), 1.0);
+    let (worst, _) = gaps(core.raster().pixels(), coarse.iter(), 1.0);
     assert!(worst < 1e-5, "the twin is not the core: {worst}");
     let mut pictures = Vec::new();
     for (sampling, limit) in [(Sampling::Light, 0.01), (Sampling::Brdf, 0.02), (Sampling::Both, 0.008)] {
         let found = environment_picture(context, &mut renderer, sampling, 1024);
-        let (worst, rms) = gaps(&found.prediction, fine.iter(), 1.0);
+        let (worst, rms) = gaps(&prediction(&found), fine.iter(), 1.0);
         eprintln!("{sampling:?}: worst {worst:.1e}, rms {rms:.1e}");
         assert!(rms < limit, "{sampling:?}: worst {worst:e}, rms {rms:e}");
         // No bias: the mean of all pixels is far better than each.
         let mean = |pixels: &[[f64; 3]]| pixels.iter().flatten().sum::<f64>();
-        let ratio = mean(&widened(&found.prediction)) / mean(&fine);
+        let ratio = mean(&widened(&prediction(&found))) / mean(&fine);
         assert!((ratio - 1.0).abs() < 0.003, "{sampling:?}: {ratio}");
         pictures.push(found);
     }
     for other in &pictures[1..] {
-        let (_, rms) = gaps(&other.prediction, widened(&pictures[0].prediction).iter(), 1.0);
+        let (_, rms) = gaps(&prediction(other), widened(&prediction(&pictures[0])).iter(), 1.0);
         assert!(rms < 0.025, "{rms}");
     }
 }
@@ -148,14 +157,14 @@ fn a_white_furnace_returns_one(context: &Context) {
     let lambert = BrdfTable::from_fn(|_| [1.0 / f64::from(PI); 3]);
     let mut renderer = Renderer::new(context, [12, 12]).unwrap();
     renderer.set_materials(None, &upload(context, &lambert)).unwrap();
-    let white = Environment::new(16, 8, vec![[1.0; 3]; 128]).unwrap();
+    let white = Environment::new(Raster::filled(16, 8, [1.0; 3])).unwrap();
     renderer.set_light(Light::Environment((&white).into())).unwrap();
     for sampling in [Sampling::Light, Sampling::Brdf, Sampling::Both] {
         renderer.set_shading(ShadingOptions { sampling, ..ShadingOptions::default() }).unwrap();
         renderer.render_more(512).unwrap();
         let found = renderer.read_linear().unwrap();
-        let inside = found.prediction.iter().zip(&found.coverage).filter(|(_, c)| **c == 1.0);
-        let values: Vec<f32> = inside.map(|(p, _)| p[0]).collect();
+        let inside = found.raster().pixels().iter().filter(|p| p.coverage == 1.0);
+        let values: Vec<f32> = inside.map(|p| p.prediction[0]).collect();
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         let worst = values.iter().map(|x| (x - 1.0).abs()).fold(0.0, f32::max);
         eprintln!("furnace, {sampling:?}: mean {mean:.5}, worst {worst:.1e}");
@@ -179,14 +188,17 @@ fn sigma_is_weighted_by_light_and_pictures_show_what_was_asked_for(context: &Con
     renderer.render_more(16).unwrap();
     assert_eq!(renderer.samples(), 16);
     let linear = renderer.read_linear().unwrap();
-    let (low, high) = (0..24 * 16)
-        .filter(|&i| linear.prediction[i][0] > 0.0)
-        .fold((f32::MAX, 0.0f32), |(a, b), i| (a.min(linear.sigma[i]), b.max(linear.sigma[i])));
+    let means = linear.raster().pixels();
+    assert_eq!(means.len(), 24 * 16);
+    let (low, high) = means
+        .iter()
+        .filter(|p| p.prediction[0] > 0.0)
+        .fold((f32::MAX, 0.0f32), |(a, b), p| (a.min(p.sigma), b.max(p.sigma)));
     let all = sigma.planes().iter().flatten().fold((f32::MAX, 0.0f32), |(a, b), &s| (a.min(s), b.max(s)));
     assert!(low >= all.0 * 0.99 && high <= all.1 * 1.01 && high > low, "{low} {high} {all:?}");
     // The prediction is darker by a tenth.
     let differences = linear.difference(2.0);
-    for (difference, truth) in differences.iter().zip(&linear.truth) {
+    for (difference, LinearPixel { truth, .. }) in differences.iter().zip(means) {
         assert!((difference + 0.2 * truth[0]).abs() <= 1e-3 * truth[0], "{difference} {truth:?}");
     }
     let middle = 8 * 24 + 12;
@@ -208,7 +220,7 @@ fn sigma_is_weighted_by_light_and_pictures_show_what_was_asked_for(context: &Con
     let split = show(Show::Split { at: 0.5 }, Background::Black);
     assert_eq!((split[middle - 2], split[middle + 2]), (truth[middle - 2], predicted[middle + 2]));
     // Gamma 2.2, clipped, by hand.
-    let value = (linear.truth[middle][0].clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0).round();
+    let value = (means[middle].truth[0].clamp(0.0, 1.0).powf(1.0 / 2.2) * 255.0).round();
     assert!((f32::from(truth[middle][0]) - value).abs() <= 1.0, "{:?} {value}", truth[middle]);
     let wrong = renderer.read_display(&Display { exposure: -1.0, ..Display::default() });
     assert!(wrong.unwrap_err().to_string().contains("positive exposure"));

@@ -172,8 +172,8 @@ impl Render {
         let mut report = json!({
             "material": source.name,
             "scene": self.scene.display().to_string(),
-            "width": linear.width,
-            "height": linear.height,
+            "width": linear.raster().width(),
+            "height": linear.raster().height(),
             "spp": renderer.samples(),
             "adapter": context.describe(),
             "exposure": exposure,

@@ -6,7 +6,7 @@ use anyhow::Result;
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, panel_figure, round_limit, write_rgba_png};
 use gpbrdf_core::formats::write_image_exr;
-use gpbrdf_render::{Background, Display, LinearPicture, Renderer};
+use gpbrdf_render::{Background, Display, LinearPicture, LinearPixel, Renderer};
 
 use super::choices::ShowName;
 
@@ -26,16 +26,19 @@ pub(super) struct Pictures<'a> {
 impl Pictures<'_> {
     /// Writes values as linear RGB.
     pub(super) fn write_exr(&self, file: &mut AtomicFile, show: ShowName) -> Result<()> {
-        let linear = self.linear;
-        let grey = |values: &[f32]| values.iter().map(|&x| [f64::from(x); 3]).collect();
-        let colour = |pixels: &[[f32; 3]]| pixels.iter().map(|p| p.map(f64::from)).collect();
-        let pixels: Vec<[f64; 3]> = match show {
-            ShowName::Truth => colour(&linear.truth),
-            ShowName::Prediction => colour(&linear.prediction),
-            ShowName::Sigma => grey(&linear.sigma),
-            ShowName::Difference => grey(&linear.difference(1.0)),
+        let raster = self.linear.raster();
+        let each = |rgb: fn(&LinearPixel) -> [f32; 3]| {
+            raster.pixels().iter().map(|pixel| rgb(pixel).map(f64::from)).collect()
         };
-        Ok(write_image_exr(file, linear.width, linear.height, &pixels)?)
+        let pixels: Vec<[f64; 3]> = match show {
+            ShowName::Truth => each(|pixel| pixel.truth),
+            ShowName::Prediction => each(|pixel| pixel.prediction),
+            ShowName::Sigma => each(|pixel| [pixel.sigma; 3]),
+            ShowName::Difference => {
+                self.linear.difference(1.0).into_iter().map(|x| [f64::from(x); 3]).collect()
+            }
+        };
+        Ok(write_image_exr(file, raster.width(), raster.height(), &pixels)?)
     }
 
     /// Writes a figure of truth, prediction and difference.
@@ -59,7 +62,8 @@ impl Pictures<'_> {
     fn write_plain(&mut self, file: &mut AtomicFile, show: ShowName) -> Result<()> {
         let pixels = self.renderer.read_display(&Display { show: show.into(), ..self.display })?;
         if self.display.background == Background::Transparent {
-            write_rgba_png(file, self.linear.width, self.linear.height, &pixels)?;
+            let raster = self.linear.raster();
+            write_rgba_png(file, raster.width(), raster.height(), &pixels)?;
         } else {
             self.picture(&pixels).write_png(file)?;
         }
@@ -72,7 +76,7 @@ impl Pictures<'_> {
             ShowName::Truth => ("truth", None),
             ShowName::Prediction => ("prediction", None),
             ShowName::Sigma => {
-                let high = self.limit_of(&self.linear.sigma);
+                let high = self.limit_of(self.linear.raster().map(|pixel| pixel.sigma).pixels());
                 ("sigma", Some(Scale { map: Colormap::Sequential, low: 0.0, high }))
             }
             ShowName::Difference => {
@@ -89,7 +93,8 @@ impl Pictures<'_> {
     /// The end of the scale of these values.
     fn limit_of(&self, values: &[f32]) -> f64 {
         let chosen = || {
-            let mask: Vec<bool> = self.linear.coverage.iter().map(|&share| share == 1.0).collect();
+            let mask: Vec<bool> =
+                self.linear.raster().pixels().iter().map(|pixel| pixel.coverage == 1.0).collect();
             let wide: Vec<f64> = values.iter().copied().map(f64::from).collect();
             round_limit(&wide, &mask)
         };
@@ -97,8 +102,8 @@ impl Pictures<'_> {
     }
 
     fn picture(&self, pixels: &[[u8; 4]]) -> Picture {
-        let width = self.linear.width;
-        Picture::from_fn(width, self.linear.height, |x, y| {
+        let (width, height) = (self.linear.raster().width(), self.linear.raster().height());
+        Picture::from_fn(width, height, |x, y| {
             let [r, g, b, _] = pixels[y * width + x];
             [r, g, b]
         })

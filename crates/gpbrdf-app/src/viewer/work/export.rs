@@ -86,9 +86,10 @@ pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &O
         let mut files = vec![png_file(&path, &picture)?];
         let linear = truth.iter().map(|image| ("truth", image)).chain([("prediction", &prediction)]);
         for (which, image) in linear {
-            let pixels: Vec<Rgb> = image.pixels().iter().map(|p| p.map(f64::from)).collect();
+            let raster = image.raster();
+            let pixels: Vec<Rgb> = raster.pixels().iter().map(|p| p.map(f64::from)).collect();
             let target = beside(&path, &format!("-{which}.exr"));
-            files.push(exr_file(&target, [image.width(), image.height()], &pixels)?);
+            files.push(exr_file(&target, [raster.width(), raster.height()], &pixels)?);
         }
         AtomicFile::commit_all(files)?;
         Ok(format!("wrote \"{}\" and the linear pictures beside it", path.display()))

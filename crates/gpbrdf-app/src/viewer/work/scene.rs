@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
+use gpbrdf_core::base::Raster;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
     AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
@@ -314,13 +315,11 @@ fn light(key: &SceneKey, environment: &Environment) -> Light {
 /// The environment turned about the vertical axis, by whole pixels.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the width")]
 fn turned(environment: &Environment, yaw: f64) -> Environment {
-    let width = environment.width();
+    let map = environment.raster();
+    let width = map.width();
     let shift = ((yaw / std::f64::consts::TAU).rem_euclid(1.0) * width as f64) as usize % width.max(1);
-    let mut pixels = environment.pixels().to_vec();
-    for row in pixels.chunks_mut(width.max(1)) {
-        row.rotate_left(shift);
-    }
-    Environment::new(width, environment.height(), pixels).unwrap_or_else(|_| environment.clone())
+    let turned = Raster::from_fn(width, map.height(), |x, y| *map.at((x + shift) % width, y));
+    Environment::new(turned).unwrap_or_else(|_| environment.clone())
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the device")]

@@ -168,7 +168,7 @@ fn make(
     let scale = exposure * key.light.exposure.exp2();
     let plain = |image: &Image| {
         disc(image, |i| {
-            let [r, g, b] = image.pixels()[i].map(|x| shown(f64::from(x) * scale, 2.2));
+            let [r, g, b] = image.raster().pixels()[i].map(|x| shown(f64::from(x) * scale, 2.2));
             Color32::from_rgb(r, g, b)
         })
     };
@@ -201,7 +201,7 @@ fn difference(truth: &Image, mean: &Image, exposure: f64) -> Vec<f64> {
         let channel = |c: usize| f64::from(b[c]) - f64::from(a[c]);
         exposure * (channel(0) + channel(1) + channel(2)) / 3.0
     };
-    std::iter::zip(truth.pixels(), mean.pixels()).map(gap).collect()
+    std::iter::zip(truth.raster().pixels(), mean.raster().pixels()).map(gap).collect()
 }
 
 /// The difference in colour, red where the prediction is too bright, with the value at the end of the scale.
@@ -238,7 +238,7 @@ fn mean_sigma(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> O
     let values: Vec<f64> = (0..COARSE * COARSE)
         .map(|i| {
             let sum = total(i);
-            let largest = image.pixels()[i].into_iter().fold(0.0, f32::max);
+            let largest = image.raster().pixels()[i].into_iter().fold(0.0, f32::max);
             if image.mask()[i] && sum > 0.0 { f64::from(largest) / sum } else { f64::NAN }
         })
         .collect();
@@ -249,7 +249,7 @@ fn mean_sigma(table: &BrdfTable, lights: &[DistantLight], stale: Stale<'_>) -> O
 /// so that the rim can be antialiased.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels, and a share of 255")]
 fn disc(image: &Image, colour: impl Fn(usize) -> Color32) -> ColorImage {
-    let (width, height) = (image.width(), image.height());
+    let (width, height) = (image.raster().width(), image.raster().height());
     let inside = 1.0 - 5.0 / width as f64;
     let pixels = (0..width * height)
         .map(|i| {
@@ -281,11 +281,13 @@ fn metrics(request: &SphereRequest, stale: Stale<'_>) -> Option<ImageMetrics> {
 
 #[cfg(test)]
 mod tests {
+    use gpbrdf_core::base::Raster;
+
     use super::*;
 
     #[test]
     fn differences_are_prediction_minus_truth_as_exposed() {
-        let image = |pixel: [f32; 3]| Image::new(16, 16, vec![pixel; 256], vec![true; 256]).unwrap();
+        let image = |pixel: [f32; 3]| Image::new(Raster::filled(16, 16, pixel), vec![true; 256]).unwrap();
         let truth = image([0.25, 0.5, 0.75]);
         let prediction = image([0.5, 0.5, 1.25]);
         assert_eq!(difference(&truth, &prediction, 2.0)[0], 0.5);
