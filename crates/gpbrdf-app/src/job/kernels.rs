@@ -14,6 +14,15 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Kernels([String; 3]);
 
 impl Kernels {
+    /// What the command line says about kernels.
+    pub(super) fn help() -> String {
+        let names = Shape::ALL.map(Shape::name).join(", ");
+        format!(
+            "Kernel shapes, summed: {names} (with --nu). On a lattice there may be three such sums joined by \
+             commas, for theta_h, theta_d and phi_d"
+        )
+    }
+
     /// Whether all axes have the same kernel.
     pub(crate) fn are_alike(&self) -> bool {
         let [first, rest @ ..] = &self.0;

@@ -48,9 +48,8 @@ pub(crate) struct ModelSpec {
     /// Exact solver.
     #[arg(long, default_value = "auto", value_parser = named::<Solver>(&Solver::NAMES))]
     pub(crate) solver: Solver,
-    /// Kernel shapes, summed: se, rq, matern12, matern32, matern52, matern (with --nu). On a lattice there
-    /// may be three such sums joined by commas, for theta_h, theta_d and phi_d.
-    #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value_t)]
+    /// The kernel.
+    #[arg(long, value_name = "SHAPE[+SHAPE...]", default_value_t, help = Kernels::help())]
     pub(crate) kernel: Kernels,
     /// Smoothness of `--kernel matern`.
     #[arg(long, value_name = "NU", default_value_t = ModelSpec::default().nu, allow_hyphen_values = true)]
