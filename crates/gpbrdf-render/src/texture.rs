@@ -60,7 +60,7 @@ impl BrdfTexture {
     /// A texture of zeros, to be written by a compute shader.
     ///
     /// # Errors
-    /// Those of [`Context::guard`], such as [`Error::OutOfMemory`].
+    /// Those of [`Context::guard`], such as [`Error::OutOfMemory`](crate::Error::OutOfMemory).
     pub fn empty(context: &Context, precision: Precision) -> Result<Self> {
         let texture = context.guard("BRDF texture", || {
             context.device().create_texture(&wgpu::TextureDescriptor {
