@@ -41,18 +41,18 @@ const SCENES: [Scene; 5] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
-        settings: r#"{"arrangement": "Slices"}"#,
+        settings: r#"{"view": "slices"}"#,
         hovered: Some("Prediction slice"),
         ..PLAIN
     },
     Scene {
         name: "viewer-curves",
-        settings: r#"{"arrangement": "Plots", "dark": false, "curves": {"kind": "ThetaH", "log": true}}"#,
+        settings: r#"{"view": "plots", "dark": false, "panes": {"plots": {"kind": "ThetaH", "log": true}}}"#,
         ..PLAIN
     },
     Scene {
         name: "viewer-object",
-        settings: r#"{"arrangement": "Sphere", "shape": "Knot", "sphere": "SideBySide"}"#,
+        settings: r#"{"view": "3d", "panes": {"3d": {"shape": "Knot", "shown": "SideBySide"}}}"#,
         converges: Duration::from_secs(5),
         ..PLAIN
     },
