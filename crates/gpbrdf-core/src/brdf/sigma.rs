@@ -56,7 +56,9 @@ impl SigmaTable {
     /// Sigma of each channel as a table, for code that looks up tables of three channels.
     #[must_use]
     pub fn to_table(&self) -> BrdfTable {
-        let cell = |cell| std::array::from_fn(|channel| self.value(cell, channel));
-        BrdfTable::from_cells((0..N_CELLS).map(cell).collect())
+        BrdfTable::from_cells(match self.planes.as_slice() {
+            [r, g, b] => r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect(),
+            planes => planes[0].iter().map(|&sigma| [sigma; 3]).collect(),
+        })
     }
 }
