@@ -48,8 +48,17 @@ impl SphereView {
     }
 
     pub(super) fn progress(&self) -> Progress {
-        let shown = self.images().map(|images| (images.key, images.fine));
-        if shown == self.requested.map(|key| (key, true)) { Progress::Done } else { Progress::Refining }
+        match self.images() {
+            Some(images) if Some(images.key) == self.requested => {
+                if images.fine {
+                    Progress::Done
+                } else {
+                    Progress::Refining
+                }
+            }
+            None if self.requested.is_none() => Progress::Done,
+            _ => Progress::Waiting,
+        }
     }
 
     /// Shows pictures in place of older ones.
