@@ -97,8 +97,7 @@ impl BrdfTexture {
         let texel = |h: usize, d: usize, p: usize| {
             let cell = cell_index(h, d, p);
             let [r, g, b] = table.values()[cell];
-            let largest = |s: &SigmaTable| (0..3).map(|c| s.value(cell, c)).fold(0.0, f32::max);
-            [r, g, b, sigma.map_or(0.0, largest)]
+            [r, g, b, sigma.map_or(0.0, |sigma| sigma.largest(cell))]
         };
         let mut bytes = Vec::with_capacity(N_CELLS * precision.texel_bytes() as usize);
         for p in 0..N_PHI_D {
