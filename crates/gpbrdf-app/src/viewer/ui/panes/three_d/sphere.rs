@@ -47,18 +47,10 @@ impl SphereView {
         self.images().map(|images| images.exposure)
     }
 
+    /// A sphere refines from the start: what a fit says is shown without waiting for its first picture.
     pub(super) fn progress(&self) -> Progress {
-        match self.images() {
-            Some(images) if Some(images.key) == self.requested => {
-                if images.fine {
-                    Progress::Done
-                } else {
-                    Progress::Refining
-                }
-            }
-            None if self.requested.is_none() => Progress::Done,
-            _ => Progress::Waiting,
-        }
+        let shown = self.images().map(|images| (images.key, images.fine));
+        if shown == self.requested.map(|key| (key, true)) { Progress::Done } else { Progress::Refining }
     }
 
     /// Shows pictures in place of older ones.
