@@ -147,13 +147,8 @@ pub(crate) struct KernelSum {
     pub(crate) last_cell: u32,
     pub(crate) first_sample: u32,
     pub(crate) last_sample: u32,
-    /// Rows of the targets along `phi_d`.
-    pub(crate) rows: u32,
     /// 1 where the third coordinate is an angle, else 0.
     pub(crate) chord: u32,
-    /// The largest second coordinate.
-    pub(crate) limit: f32,
-    pub(crate) unused: u32,
 }
 
 /// `Sample` of `bake/kernel_sum.wgsl`: numbers as sums of two f32.

@@ -124,7 +124,7 @@ pub(crate) fn separable() -> String {
 pub(crate) fn kernel_sum(kernel: &str, parameters: usize, double: bool) -> String {
     let real = if double { "f64" } else { "f32" };
     compose(
-        &[part::GRID, part::REAL, part::SHAPES, part::KERNEL_SUM, kernel],
+        &[part::REAL, part::SHAPES, part::KERNEL_SUM, kernel],
         &[Definition::Alias("real", real), Definition::Constant("PARAMETERS", parameters)],
     )
 }

@@ -1,5 +1,5 @@
-//! Gaussian processes: an exact one for any points, an exact one for product lattices, and a sparse one on
-//! inducing lattices.
+//! Gaussian processes: an exact one for any points, one for thousands of scattered samples, an exact one for
+//! product lattices, and a sparse one on inducing lattices.
 
 mod hyper;
 #[cfg(feature = "fit")]
@@ -9,6 +9,8 @@ mod posterior;
 pub(crate) mod problem;
 #[cfg(feature = "fit")]
 mod report;
+#[cfg(feature = "fit")]
+mod search;
 pub(crate) mod solver;
 pub(crate) mod table;
 pub(crate) mod tensors;
@@ -16,6 +18,7 @@ pub(crate) mod tensors;
 pub(crate) mod dense;
 pub(crate) mod inducing;
 pub(crate) mod lattice;
+pub(crate) mod scattered;
 
 pub use dense::DenseGp;
 pub use dense::cost::{DenseCost, dense_cost};
@@ -37,8 +40,8 @@ pub(crate) use inducing::fit::{Budget, GridData, fit_inducing};
 #[cfg(feature = "fit")]
 pub use lattice::{LatticeLikelihood, fit::fit_lattice};
 #[cfg(feature = "fit")]
-pub use optimize::{OptimizeOptions, Optimum, Parameter, maximize};
+pub use optimize::{LogNormal, OptimizeOptions, Optimum, Parameter, maximize};
 #[cfg(feature = "fit")]
-pub use problem::Observer;
+pub use problem::{Observer, Outliers};
 #[cfg(feature = "fit")]
 pub use report::{FitReport, Noise};

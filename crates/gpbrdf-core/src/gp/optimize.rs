@@ -23,6 +23,31 @@ pub struct Parameter {
     pub lower: f64,
     /// Natural logarithm of the upper bound.
     pub upper: f64,
+    /// What is known of the parameter beforehand; `None` if nothing is.
+    pub prior: Option<LogNormal>,
+}
+
+/// A log-normal prior of a positive parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogNormal {
+    /// Natural logarithm of the median.
+    pub log_median: f64,
+    /// Standard deviation of the logarithm.
+    pub deviation: f64,
+}
+
+impl LogNormal {
+    /// A prior with this median whose logarithm has this standard deviation.
+    #[must_use]
+    pub fn new(median: f64, deviation: f64) -> Self {
+        Self { log_median: median.ln(), deviation }
+    }
+
+    /// The log density of the logarithm without its constant, and its derivative.
+    fn log_density(self, log_value: f64) -> (f64, f64) {
+        let z = (log_value - self.log_median) / self.deviation;
+        (-0.5 * z * z, -z / self.deviation)
+    }
 }
 
 /// Limits of a search, and the number of its starts.
@@ -53,8 +78,10 @@ impl Default for OptimizeOptions {
 pub struct Optimum {
     /// Natural logarithms of the best parameters found.
     pub log_parameters: Vec<f64>,
-    /// Value of the objective at these parameters.
+    /// Value of the objective at these parameters, priors included.
     pub value: f64,
+    /// The part of the value that is due to priors.
+    pub log_prior: f64,
     /// Number of evaluations of the objective and its gradient, over all starts.
     pub evaluations: usize,
     /// Whether the search from the best start ended because it reached one of the tolerances.
@@ -63,7 +90,9 @@ pub struct Optimum {
     pub at_bound: Vec<String>,
 }
 
-/// Maximises `objective` (its value and gradient in log-parameters) within bounds.
+/// Maximises `objective` (its value and gradient in log-parameters) plus the log densities of the priors within
+/// bounds. With a log marginal likelihood as the objective, the maximum is the posterior mode of the logarithms
+/// of the parameters (maximum a posteriori).
 ///
 /// Bounds enter by the substitution `p = lower + (upper - lower) (1 + sin x) / 2`, and the search runs over
 /// the free variable `x`. The objective is divided by the number of targets, so that tolerances
@@ -145,7 +174,24 @@ where
         })
         .map(|(p, _)| p.name.clone())
         .collect();
-    Ok(Optimum { log_parameters, value: -cost / scale, evaluations: shared.evaluations, converged, at_bound })
+    let log_prior = log_prior(parameters, &log_parameters, &mut []);
+    let (value, evaluations) = (-cost / scale, shared.evaluations);
+    Ok(Optimum { log_parameters, value, log_prior, evaluations, converged, at_bound })
+}
+
+/// The sum of the log densities of all priors at a point; their derivatives are added to `gradient`.
+fn log_prior(parameters: &[Parameter], point: &[f64], gradient: &mut [f64]) -> f64 {
+    let mut sum = 0.0;
+    for (k, (parameter, &value)) in parameters.iter().zip(point).enumerate() {
+        if let Some(prior) = parameter.prior {
+            let (density, slope) = prior.log_density(value);
+            sum += density;
+            if let Some(gradient) = gradient.get_mut(k) {
+                *gradient += slope;
+            }
+        }
+    }
+    sum
 }
 
 impl Parameter {
@@ -190,7 +236,8 @@ impl<F: FnMut(&[f64]) -> Result<(f64, Vec<f64>)>> Shared<F> {
         let point: Vec<f64> = self.parameters.iter().zip(x).map(|(p, &x)| p.at(x)).collect();
         self.evaluations += 1;
         let (cost, gradient) = match (self.objective)(&point) {
-            Ok((value, gradient)) if value.is_finite() => {
+            Ok((value, mut gradient)) if value.is_finite() => {
+                let value = value + log_prior(&self.parameters, &point, &mut gradient);
                 let slopes = self.parameters.iter().zip(x).map(|(p, &x)| p.slope(x));
                 let gradient = gradient.iter().zip(slopes).map(|(g, s)| -g * s * self.scale).collect();
                 (-value * self.scale, gradient)
@@ -275,7 +322,7 @@ mod tests {
     use super::*;
 
     fn parameter(name: &str, start: f64, lower: f64, upper: f64) -> Parameter {
-        Parameter { name: name.into(), start, lower, upper }
+        Parameter { name: name.into(), start, lower, upper, prior: None }
     }
 
     #[test]
@@ -291,6 +338,24 @@ mod tests {
         assert!(found.converged && found.at_bound.is_empty(), "{found:?}");
         assert!((found.log_parameters[0] - 1.0).abs() < 1e-4, "{found:?}");
         assert!(found.evaluations < 100, "{found:?}");
+    }
+
+    #[test]
+    fn priors_pull_what_the_objective_leaves_open() {
+        let prior = Some(LogNormal { log_median: 0.7, deviation: 0.5 });
+        let parameters =
+            [parameter("known", 0.0, -2.0, 2.0), Parameter { prior, ..parameter("open", 0.0, -2.0, 2.0) }];
+        // The first parameter is measured to 0.1; nothing is known of the second one but its prior.
+        let objective = |p: &[f64]| Ok((-50.0 * (p[0] - 0.3).powi(2), vec![-100.0 * (p[0] - 0.3), 0.0]));
+        let found = maximize(&parameters, 1, &OptimizeOptions::default(), objective).unwrap();
+        assert!((found.log_parameters[0] - 0.3).abs() < 1e-3, "{found:?}");
+        assert!((found.log_parameters[1] - 0.7).abs() < 1e-3, "{found:?}");
+        let both = [Parameter { prior, ..parameter("both", 0.0, -2.0, 2.0) }];
+        let measured = |p: &[f64]| Ok((-2.0 * (p[0] - 0.2).powi(2), vec![-4.0 * (p[0] - 0.2)]));
+        let found = maximize(&both, 1, &OptimizeOptions::default(), measured).unwrap();
+        // Two normal densities of the same width: the mode is half way.
+        assert!((found.log_parameters[0] - 0.45).abs() < 1e-3, "{found:?}");
+        assert!((found.log_prior + 0.125).abs() < 1e-3 && (found.value + 0.25).abs() < 1e-3, "{found:?}");
     }
 
     #[test]

@@ -5,6 +5,8 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::gp::optimize::OptimizeOptions;
@@ -32,10 +34,27 @@ pub(crate) struct Problem<'a> {
     pub(crate) kernel: &'a [Vec<Shape>; 3],
     /// The rule for the noise variance.
     pub(crate) noise: Noise,
+    /// What is known of the noise variance of each sample, in squared target units; empty if nothing is.
+    pub(crate) known_noise: &'a [f64],
+    /// Whether hyper-parameters have priors.
+    pub(crate) priors: bool,
+    /// What is done about outliers.
+    pub(crate) outliers: Outliers,
     /// Settings of the search.
     pub(crate) optimize: &'a OptimizeOptions,
     /// Counts the evaluations of the likelihood and calls the observer before each of them.
     pub(crate) watch: &'a Watch<'a>,
+}
+
+/// What is done about samples that contradict all samples around them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outliers {
+    /// They are taken like all others.
+    Keep,
+    /// Their noise variance is larger, according to Student's t distribution, so that they hardly count.
+    #[default]
+    Downweight,
 }
 
 /// A callback that runs before each evaluation of a likelihood. It receives the number of evaluations so far,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::gp::LeaveOneOut;
+
 /// The rule for the noise variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -14,7 +16,7 @@ pub enum Noise {
 }
 
 /// The outcome of a search for hyper-parameters.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitReport {
     /// Log marginal likelihood at the hyper-parameters that were found, summed over the channels. For a
     /// compressed table it is the variational bound.
@@ -26,4 +28,10 @@ pub struct FitReport {
     pub converged: bool,
     /// Names of the hyper-parameters that ended at a bound of their range.
     pub at_bound: Vec<String>,
+    /// Every sample as it is predicted from all others, in the order of the samples; `None` where the solver
+    /// does not compute it.
+    pub leave_one_out: Option<LeaveOneOut>,
+    /// The weight of each sample: its noise variance is that of all samples divided by the weight. Empty where
+    /// all weights are 1.
+    pub weights: Vec<f64>,
 }

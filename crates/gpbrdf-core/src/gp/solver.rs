@@ -12,32 +12,34 @@ use crate::gp::posterior::Posterior;
 #[cfg(feature = "fit")]
 use crate::gp::problem::{Fitted, Problem};
 use crate::gp::tensors::TensorReader;
-use crate::gp::{dense, inducing, lattice};
+use crate::gp::{dense, inducing, lattice, scattered};
 
-/// The exact solver that a fit uses.
+/// The solver that a fit uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Solver {
-    /// The lattice solver for samples that lie on a lattice, else the dense solver.
+    /// The lattice solver for samples that lie on a lattice, else the scattered solver.
     #[default]
     Auto,
     /// Kronecker algebra, for samples that lie on a lattice; conditioning takes milliseconds.
     Lattice,
+    /// Nearest-neighbour likelihood and conjugate gradients, for up to 100,000 samples at any directions.
+    Scattered,
     /// Cholesky factorisation, for samples at any directions; conditioning takes `O(n^3)`.
     Dense,
 }
 
 impl Solver {
     /// The names in files and on the command line.
-    pub const NAMES: [&'static str; 3] = ["auto", "lattice", "dense"];
+    pub const NAMES: [&'static str; 4] = ["auto", "lattice", "scattered", "dense"];
 
     /// Replaces [`Solver::Auto`] by the solver for samples on a lattice or off it.
     #[must_use]
     pub fn resolve(self, on_lattice: bool) -> Self {
         match self {
             Self::Auto if on_lattice => Self::Lattice,
-            Self::Auto => Self::Dense,
+            Self::Auto => Self::Scattered,
             chosen => chosen,
         }
     }
@@ -49,6 +51,7 @@ impl Solver {
     pub(crate) fn fit(self, problem: &Problem<'_>) -> Result<Fitted> {
         match self.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::fit(problem),
+            Self::Scattered => scattered::solve::fit(problem),
             _ => dense::solve::fit(problem),
         }
     }
@@ -58,6 +61,7 @@ impl Solver {
     pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
         match hyper.solver.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::condition(problem, hyper),
+            Self::Scattered => scattered::solve::condition(problem, hyper),
             _ => dense::solve::condition(problem, hyper),
         }
     }
@@ -68,6 +72,7 @@ pub(crate) fn load(solver: &str, header: Value, tensors: &TensorReader<'_>) -> R
     match solver {
         lattice::posterior::NAME => lattice::posterior::load(header, tensors),
         dense::posterior::NAME => dense::posterior::load(header, tensors),
+        scattered::posterior::NAME => scattered::posterior::load(header, tensors),
         inducing::posterior::NAME => inducing::posterior::load(header, tensors),
         other => Err(tensors.wrong("a solver of this version", format!("\"{other}\""))),
     }

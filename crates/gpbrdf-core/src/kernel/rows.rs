@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use super::axis::Kernel1d;
-use super::composite::{AxisMetric, Kernel, KernelBody};
-use crate::base::simd::{add_scaled, multiply, scale_into, vectorized};
+use super::composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
+use crate::base::simd::{add_scaled, multiply, scale_in_place, scale_into, vectorized};
 
 /// Number of points of a strip.
 pub(super) const STRIP: usize = 512;
@@ -44,6 +44,35 @@ impl Points {
 
     pub(crate) fn len(&self) -> usize {
         self.len
+    }
+
+    /// `sum_k (x_k - y_k)^2 / l_k^2` from the points of `range` to point `j` of `other`, where there are three
+    /// coordinates and all are linear; otherwise returns false.
+    fn scaled_distances(
+        &self,
+        length_scale: &[f64],
+        range: Range<usize>,
+        other: &Self,
+        j: usize,
+        out: &mut [f64],
+    ) -> bool {
+        use AxisPoints::Linear;
+        let ([Linear(x0), Linear(x1), Linear(x2)], [Linear(y0), Linear(y1), Linear(y2)]) =
+            (&self.axes[..], &other.axes[..])
+        else {
+            return false;
+        };
+        let ([y0, y1, y2], [w0, w1, w2]) =
+            ([y0[j], y1[j], y2[j]], [0, 1, 2].map(|k: usize| (length_scale[k] * length_scale[k]).recip()));
+        let (x0, x1, x2) = (&x0[range.clone()], &x1[range.clone()], &x2[range]);
+        vectorized(|| {
+            for (((o, x0), x1), x2) in out.iter_mut().zip(x0).zip(x1).zip(x2) {
+                *o = w0 * ((x0 - y0) * (x0 - y0))
+                    + w1 * ((x1 - y1) * (x1 - y1))
+                    + w2 * ((x2 - y2) * (x2 - y2));
+            }
+        });
+        true
     }
 
     /// Squared distances along axis `k` from the points of `range` to point `j` of `other`.
@@ -111,6 +140,14 @@ impl Kernel {
         for (strip, out) in out.chunks_mut(STRIP).enumerate() {
             let start = rows.start + strip * STRIP;
             let n = out.len();
+            // One ARD term of three linear coordinates is what scattered samples have: everything in one pass.
+            if let [KernelTerm { variance, body: KernelBody::Ard { shape, length_scale } }] = &self.terms[..]
+                && points.scaled_distances(length_scale, start..start + n, other, j, out)
+            {
+                shape.fill(out);
+                scale_in_place(*variance, out);
+                continue;
+            }
             for (k, d2) in scratch.d2.iter_mut().enumerate() {
                 points.squared_distances(k, start..start + n, other, j, &mut d2[..n]);
             }

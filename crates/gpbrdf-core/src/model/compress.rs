@@ -109,7 +109,7 @@ fn inducing_lattices(
         log_marginal_likelihood: fits.iter().map(|fit| fit.bound).sum(),
         evaluations: fits.first().map_or(0, |fit| fit.evaluations),
         converged: true,
-        at_bound: Vec::new(),
+        ..FitReport::default()
     };
     let parts = fits.into_iter().map(|fit| {
         let values = fit.values.into_iter().map(|value| to_half(value).to_f64()).collect();

@@ -2,10 +2,10 @@
 
 use crate::base::error::{Error, Result};
 use crate::gp::problem::{Problem, Watch};
-use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Solver};
+use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Outliers, Solver};
 use crate::kernel::Shape;
 use crate::model::Model;
-use crate::sample::{InputSpace, LatticeLayout, MeanFunction, SampleSet, Transform};
+use crate::sample::{InputSpace, MeanFunction, SampleSet, Transform};
 
 /// Options of [`fit`].
 #[derive(Clone, Debug)]
@@ -13,8 +13,8 @@ pub struct FitOptions {
     /// The solver.
     pub solver: Solver,
     /// For each axis, the shapes whose kernels are summed. The lattice solver takes the product of these sums
-    /// over the axes. The dense solver sums kernels of the joint distance with one length scale per axis, and
-    /// uses the shapes of the first axis only.
+    /// over the axes. The other solvers sum kernels of the joint distance with one length scale per axis, and
+    /// use the shapes of the first axis only.
     pub kernel: [Vec<Shape>; 3],
     /// The map from BRDF values to targets.
     pub transform: Transform,
@@ -22,6 +22,12 @@ pub struct FitOptions {
     pub mean: MeanFunction,
     /// The rule for the noise variance.
     pub noise: Noise,
+    /// Whether the hyper-parameters of scattered samples have weak priors, which decide what the samples leave
+    /// open: length scales about 0.4 of the range of their coordinate, a noise of about 1 % of the standard
+    /// deviation of the targets. Without them the likelihood alone decides, as in the paper.
+    pub hyper_priors: bool,
+    /// What is done about samples that contradict all samples around them.
+    pub outliers: Outliers,
     /// Whether each channel gets its own hyper-parameters instead of shared ones.
     pub per_channel: bool,
     /// Input space for samples off a lattice; those on a lattice use its own space.
@@ -40,8 +46,10 @@ impl Default for FitOptions {
             transform: Transform::default(),
             mean: MeanFunction::default(),
             noise: Noise::default(),
+            hyper_priors: true,
+            outliers: Outliers::default(),
             per_channel: false,
-            space: LatticeLayout::default().space().into(),
+            space: InputSpace::PolarAngles,
             optimize: OptimizeOptions::default(),
             observer: Observer::default(),
         }
@@ -69,6 +77,9 @@ impl FitOptions {
             space: self.space,
             kernel: &self.kernel,
             noise: self.noise,
+            known_noise: &[],
+            priors: self.hyper_priors,
+            outliers: self.outliers,
             optimize: &self.optimize,
             watch,
         }
@@ -160,7 +171,7 @@ mod tests {
     use crate::formats::source::Source;
     use crate::kernel::KernelBody;
     use crate::model::IntervalOf;
-    use crate::sample::{Layout, Provenance};
+    use crate::sample::{LatticeLayout, Layout, Provenance};
     use std::ops::ControlFlow;
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};

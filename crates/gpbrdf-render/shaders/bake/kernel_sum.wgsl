@@ -1,5 +1,5 @@
 // The predictive mean of a process in the form of a kernel sum: in each cell, the sum of kernel values times
-// weights over all samples. Needs shared/grid.wgsl, bake/real.wgsl and bake/shapes.wgsl.
+// weights over all samples. Needs bake/real.wgsl and bake/shapes.wgsl.
 //
 // Composed with the definitions of `real`, f64 or f32, and of PARAMETERS, the number of kernel parameters,
 // and with `fn kernel(d: vec3<real>) -> real`: the covariance for the squared distances along the three axes,
@@ -12,14 +12,9 @@ struct KernelSum {
     last_cell: u32,
     first_sample: u32,
     last_sample: u32,
-    // Rows of the targets along phi_d.
-    rows: u32,
     // 1 where the third coordinate is an angle, given as sine and cosine, with the distance
     // |sin(difference)|; else 0.
     chord: u32,
-    // The largest second coordinate.
-    limit: f32,
-    unused: u32,
 }
 
 struct Sample {
@@ -34,15 +29,9 @@ struct Sample {
 // Samples that a workgroup shares at a time, one for each of its invocations.
 const TILE: u32 = 64u;
 
-// Offsets into `tables`.
-const SECOND: u32 = N_THETA_H;
-const SCALE: u32 = SECOND + N_THETA_D;
-const THIRD: u32 = SCALE + N_THETA_H * N_COLUMNS;
-
 @group(0) @binding(0) var<uniform> form: KernelSum;
-// First coordinates [i_theta_h]; the factors of the second coordinate that depend on theta_d [i_theta_d] and
-// on the column [i_theta_h][column]; third coordinates, or their sines and cosines, [row][2]; parameters of
-// the kernel.
+// The parameters of the kernel, then the coordinates of the cells [cell][4]: the third and fourth are the sine
+// and cosine of the third one where that is an angle.
 @group(0) @binding(1) var<storage, read> tables: array<vec2f>;
 @group(0) @binding(2) var<storage, read> samples: array<Sample>;
 // Which targets are computed, as indices into `targets`: those of the cells whose coordinates differ.
@@ -63,19 +52,16 @@ fn sum_kernels(
     @builtin(local_invocation_index) local: u32,
 ) {
     for (var k = 0u; k < PARAMETERS; k++) {
-        parameters[k] = joined(tables[THIRD + 2u * form.rows + k]);
+        parameters[k] = joined(tables[k]);
     }
     // Invocations past the last cell repeat its sum, because all of a workgroup have to reach the barriers.
     let number = form.first_cell + id.x;
-    let cell = cells[min(number, form.last_cell - 1u)];
-    let l = cell % N_THETA_D;
-    let row = cell / N_THETA_D % form.rows;
-    let i = cell / N_THETA_D / form.rows;
-    let column = column_index(i, row);
-    let x0 = joined(tables[i]);
-    let x1 = min(joined(tables[SECOND + l]) * joined(tables[SCALE + column]), real(form.limit));
-    let x2 = joined(tables[THIRD + 2u * row]);
-    let x3 = joined(tables[THIRD + 2u * row + 1u]);
+    let last = min(number, form.last_cell - 1u);
+    let at = PARAMETERS + 4u * last;
+    let x0 = joined(tables[at]);
+    let x1 = joined(tables[at + 1u]);
+    let x2 = joined(tables[at + 2u]);
+    let x3 = joined(tables[at + 3u]);
 
     var sum0 = real(0.0);
     var sum1 = real(0.0);
@@ -105,6 +91,6 @@ fn sum_kernels(
         }
     }
     if number < form.last_cell {
-        targets[cell] += vec4f(f32(sum0), f32(sum1), f32(sum2), 0.0);
+        targets[cells[number]] += vec4f(f32(sum0), f32(sum1), f32(sum2), 0.0);
     }
 }

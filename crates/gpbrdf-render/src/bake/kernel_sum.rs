@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H};
+use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 use gpbrdf_core::gp::{KernelSum, TableGeometry};
 use gpbrdf_core::kernel::AxisMetric;
 use wgpu::BufferUsages;
@@ -100,9 +100,9 @@ impl Operands {
         geometry: &TableGeometry,
         chord: bool,
     ) -> Result<Self> {
-        let tables = tables(geometry, kernel, chord);
-        let samples = samples(process, first_channel, chord);
         let cells = distinct_cells(geometry);
+        let tables = tables(kernel, process, geometry, &cells, chord);
+        let samples = samples(process, first_channel, chord);
         let buffer = |label, bytes| context.buffer_of(label, bytes, BufferUsages::STORAGE);
         Ok(Self {
             tables: buffer("bake: tables", bytemuck::cast_slice(&tables))?,
@@ -139,10 +139,7 @@ impl Operands {
                     last_cell: to_u32(cell + count),
                     first_sample: to_u32(sample),
                     last_sample: to_u32(last_sample),
-                    rows: to_u32(targets.rows()),
                     chord: u32::from(chord),
-                    limit: narrow(targets.geometry.limit().min(f64::from(f32::MAX))),
-                    unused: 0,
                 })?;
                 context.guard(WHAT, || {
                     let bindings = [
@@ -221,11 +218,23 @@ fn third_coordinate(x: f64, chord: bool) -> [f64; 2] {
     if chord { [x.sin(), x.cos()] } else { [x, 0.0] }
 }
 
-/// The `tables` of the shader: coordinates of cells, then the parameters of the kernel.
-fn tables(geometry: &TableGeometry, kernel: &KernelSource, chord: bool) -> Vec<[f32; 2]> {
-    let along = geometry.first().iter().chain(geometry.second()).chain(geometry.scale()).copied();
-    let third = geometry.third().iter().flat_map(|&x| third_coordinate(x, chord));
-    along.chain(third).chain(kernel.parameters.iter().copied()).map(split).collect()
+/// The `tables` of the shader: the parameters of the kernel, then the coordinates of `cells`.
+fn tables(
+    kernel: &KernelSource,
+    process: &KernelSum<'_>,
+    geometry: &TableGeometry,
+    cells: &[u32],
+    chord: bool,
+) -> Vec<[f32; 2]> {
+    let rows = geometry.third().len();
+    let coordinates = cells.iter().flat_map(|&cell| {
+        let cell = cell as usize;
+        let center = cell_center(cell / N_THETA_D / rows, cell % N_THETA_D, cell / N_THETA_D % rows);
+        let [x0, x1, x2] = process.space.coordinates(center);
+        let [x2, x3] = third_coordinate(x2, chord);
+        [x0, x1, x2, x3]
+    });
+    kernel.parameters.iter().copied().chain(coordinates).map(split).collect()
 }
 
 /// Samples with their weights at the channels of the model from `first_channel` on.

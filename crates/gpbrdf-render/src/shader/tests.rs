@@ -124,7 +124,7 @@ fn structs_are_laid_out_as_in_wgsl() {
             split),
         layout!(Separable: shape, first, third, second, pieces, signal_variance, second_prior, limit, share;
             padding),
-        layout!(KernelSum: first_cell, last_cell, first_sample, last_sample, rows, chord, limit, unused),
+        layout!(KernelSum: first_cell, last_cell, first_sample, last_sample, chord),
         layout!(Sample: high, low, weight_high, weight_low),
         layout!(Finish: offsets, transform, epsilon, rows, largest),
     ]

@@ -3,10 +3,10 @@
 use crate::base::error::{Error, Result};
 use crate::base::random::golden_ratio_subset;
 use crate::gp::dense::{DenseEvaluator, DenseGp};
-use crate::gp::hyper::MIN_NOISE_RATIO;
 use crate::gp::report::{FitReport, Noise};
-use crate::gp::{OptimizeOptions, Optimum, Parameter, maximize};
-use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
+use crate::gp::search::{SearchStart, extent};
+use crate::gp::{OptimizeOptions, Optimum, maximize};
+use crate::kernel::{AxisMetric, Shape};
 
 /// A search for the hyper-parameters of a dense process whose kernel is a sum of ARD kernels, one for each of
 /// `shapes`.
@@ -22,6 +22,9 @@ pub struct DenseFit<'a> {
     pub shapes: &'a [Shape],
     /// The rule for the noise variance.
     pub noise: Noise,
+    /// The usual length scale along each coordinate and the deviation of its logarithm, for weak priors of the
+    /// hyper-parameters; `None` for maximum likelihood.
+    pub priors: Option<[(f64, f64); 3]>,
     /// Settings of the search.
     pub options: &'a OptimizeOptions,
 }
@@ -39,7 +42,7 @@ impl DenseFit<'_> {
     /// Sizes that do not agree, values that are not finite, invalid shapes or noise variance, more samples
     /// than fit in memory, and the errors of `evaluation`.
     pub fn run(&self, evaluation: &dyn Fn() -> Result<()>) -> Result<(DenseGp, FitReport)> {
-        let Self { x, targets, metrics, shapes, noise, options } = *self;
+        let Self { x, targets, metrics, shapes, noise, priors, options } = *self;
         let channels = targets.len();
         let n = targets.first().map_or(0, Vec::len);
         if channels == 0 || targets.iter().any(|t| t.len() != n) {
@@ -53,38 +56,44 @@ impl DenseFit<'_> {
         shapes.iter().try_for_each(|shape| shape.validate())?;
         let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
         let data = Data { x, y: &y, dimension: metrics.len(), channels };
-        let mut problem = Problem::new(&data, metrics, shapes, noise);
+        let made = |data: &Data<'_>| {
+            let extents: Vec<f64> =
+                (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
+            let start = SearchStart::new(data.y, data.channels, &extents, metrics, shapes, noise);
+            priors.map_or(start.clone(), |usual| start.with_priors(usual))
+        };
+        let mut problem = made(&data);
         let mut scouting = 0;
         // A small subset of the samples tells good optima from bad ones at next to no cost.
         let scouts = OptimizeOptions { restarts: options.restarts.max(SCOUT_STARTS), ..*options };
         let found = if n <= SCOUTS || n <= metrics.len() {
-            problem.search(&data, &scouts, evaluation)?
+            search(&problem, &data, &scouts, evaluation)?
         } else {
             let (x, y) = data.thinned(SCOUTS);
             let thin = Data { x: &x, y: &y, ..data };
-            let small = Problem::new(&thin, metrics, shapes, noise);
-            let scout = small.search(&thin, &scouts, evaluation)?;
+            let scout = search(&made(&thin), &thin, &scouts, evaluation)?;
             // The best optimum for the subset may be a worse start for all samples than the default one, so
             // both are tried: to the end where that is quick, else for `LAP` iterations.
             let most = if n <= FEW { u64::MAX } else { LAP };
             let lap =
                 OptimizeOptions { max_iterations: most.min(options.max_iterations), restarts: 0, ..*options };
-            let usual = problem.search(&data, &lap, evaluation)?;
+            let usual = search(&problem, &data, &lap, evaluation)?;
             problem.start_from(&scout.log_parameters);
-            let scouted = problem.search(&data, &lap, evaluation)?;
+            let scouted = search(&problem, &data, &lap, evaluation)?;
             scouting = scout.evaluations + usual.evaluations + scouted.evaluations;
             let ahead = if usual.value > scouted.value { usual } else { scouted };
             problem.start_from(&ahead.log_parameters);
-            problem.search(&data, options, evaluation)?
+            search(&problem, &data, options, evaluation)?
         };
-        problem.kernel.set_log_parameters(&found.log_parameters[..problem.kernel.n_parameters()])?;
-        let noise_variance = problem.noise_of(&found.log_parameters);
-        let gp = DenseGp::fit_at(x, &y, channels, problem.kernel, noise_variance)?;
+        let mut kernel = problem.kernel.clone();
+        let noise_variance = problem.set(&mut kernel, &found.log_parameters)?;
+        let gp = DenseGp::fit_at(x, &y, channels, kernel, noise_variance)?;
         let report = FitReport {
-            log_marginal_likelihood: found.value,
+            log_marginal_likelihood: found.value - found.log_prior,
             evaluations: found.evaluations + scouting,
             converged: found.converged,
             at_bound: found.at_bound,
+            ..FitReport::default()
         };
         Ok((gp, report))
     }
@@ -122,110 +131,28 @@ impl Data<'_> {
     }
 }
 
-/// The parameters of a search: the kernel's and, where it is optimised, the noise variance.
-struct Problem {
-    kernel: Kernel,
-    noise: Noise,
-    parameters: Vec<Parameter>,
-}
-
-impl Problem {
-    fn new(data: &Data<'_>, metrics: &[AxisMetric], shapes: &[Shape], noise: Noise) -> Self {
-        let values = data.y.len();
-        let variance = (data.y.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64).max(1e-12);
-        let extents: Vec<f64> =
-            (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
-        let kernel = starting_kernel(&extents, metrics, shapes, variance);
-        let mut parameters = parameters(&kernel, &extents, values / data.channels, variance);
-        if noise == Noise::Optimized {
-            parameters.push(Parameter {
-                name: "noise_variance".into(),
-                start: (1e-3 * variance).ln(),
-                lower: (MIN_NOISE_RATIO * variance).ln(),
-                upper: (10.0 * variance).ln(),
-            });
-        }
-        Self { kernel, noise, parameters }
-    }
-
-    fn start_from(&mut self, log_parameters: &[f64]) {
-        for (parameter, start) in self.parameters.iter_mut().zip(log_parameters) {
-            parameter.start = start.clamp(parameter.lower, parameter.upper);
-        }
-    }
-
-    fn noise_of(&self, log_parameters: &[f64]) -> f64 {
-        match self.noise {
-            Noise::Optimized => log_parameters[self.kernel.n_parameters()].exp(),
-            Noise::Fixed(variance) => variance,
-        }
-    }
-
-    fn search(
-        &self,
-        data: &Data<'_>,
-        options: &OptimizeOptions,
-        evaluation: &dyn Fn() -> Result<()>,
-    ) -> Result<Optimum> {
-        let mut evaluator = DenseEvaluator::new(data.x, data.dimension, data.y, data.channels)?;
-        let mut kernel = self.kernel.clone();
-        let count = kernel.n_parameters();
-        maximize(&self.parameters, data.y.len(), options, |p| {
-            evaluation()?;
-            kernel.set_log_parameters(&p[..count])?;
-            let mut at = evaluator.evaluate_with_gradient(&kernel, self.noise_of(p))?;
-            at.gradient.truncate(p.len());
-            Ok((at.log_marginal_likelihood, at.gradient))
-        })
-    }
-}
-
-/// The range that coordinate `k` of the samples covers, at least a small positive number.
-fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
-    match metric {
-        AxisMetric::Chord => 1.0,
-        AxisMetric::Linear => {
-            let column = || x.iter().skip(k).step_by(dimension).copied();
-            let (low, high) =
-                (column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max));
-            (high - low).max(1e-3)
-        }
-    }
-}
-
-fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], variance: f64) -> Kernel {
-    let share = variance / shapes.len().max(1) as f64;
-    let terms = shapes.iter().enumerate().map(|(i, &shape)| {
-        // Terms of the same shape must start at different length scales, or they would stay equal.
-        let fraction = 0.5 * 0.5f64.powi(i32::try_from(i).unwrap_or(30));
-        let length_scale = extents.iter().map(|extent| fraction * extent).collect();
-        KernelTerm { variance: share, body: KernelBody::Ard { shape, length_scale } }
-    });
-    Kernel { terms: terms.collect(), metric: metrics.to_vec() }
-}
-
-fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -> Vec<Parameter> {
-    // Samples cannot tell apart length scales that are shorter than their spacing.
-    let spacing = (samples as f64).powf(-1.0 / extents.len().max(1) as f64).min(0.5);
-    let kinds = kernel.parameter_kinds().into_iter();
-    kinds
-        .zip(kernel.parameter_names())
-        .zip(kernel.log_parameters())
-        .map(|((kind, name), start)| {
-            let (lower, upper) = match kind {
-                ParameterKind::Variance => (1e-4 * variance, 1e6 * variance),
-                ParameterKind::LengthScale(k) => (0.5 * spacing * extents[k], 30.0 * extents[k]),
-                ParameterKind::Alpha => (0.05, 1e3),
-                ParameterKind::Weight => (1e-5, 1e5),
-            };
-            Parameter { name, start, lower: lower.ln(), upper: upper.ln() }
-        })
-        .collect()
+/// Finds the hyper-parameters of samples from a start.
+fn search(
+    start: &SearchStart,
+    data: &Data<'_>,
+    options: &OptimizeOptions,
+    evaluation: &dyn Fn() -> Result<()>,
+) -> Result<Optimum> {
+    let mut evaluator = DenseEvaluator::new(data.x, data.dimension, data.y, data.channels)?;
+    let mut kernel = start.kernel.clone();
+    maximize(&start.parameters, data.y.len(), options, |p| {
+        evaluation()?;
+        let noise = start.set(&mut kernel, p)?;
+        let mut at = evaluator.evaluate_with_gradient(&kernel, noise)?;
+        at.gradient.truncate(p.len());
+        Ok((at.log_marginal_likelihood, at.gradient))
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::KernelBody;
 
     /// A smooth function of two coordinates at pseudo-random points, with noise of standard deviation 0.05.
     fn data(n: usize) -> (Vec<f64>, Vec<f64>) {
@@ -250,6 +177,7 @@ mod tests {
             metrics: &metrics,
             shapes: &shapes,
             noise: Noise::Optimized,
+            priors: None,
             options: &options,
         };
         let (gp, report) = fit.run(&|| Ok(())).unwrap();
@@ -273,6 +201,7 @@ mod tests {
             metrics: &metrics,
             shapes: &shapes,
             noise: Noise::Fixed(0.01),
+            priors: None,
             options: &options,
         };
         let (gp, _) = good.run(&|| Ok(())).unwrap();

@@ -53,6 +53,7 @@ pub fn fit_lattice(
         evaluations,
         converged: found.converged,
         at_bound: found.at_bound,
+        ..FitReport::default()
     };
     Ok((LatticeGp::new(data, hyper)?, report))
 }
@@ -101,7 +102,7 @@ impl Problem {
                     ParameterKind::Weight | ParameterKind::Variance => (1e-5, 1e5),
                 };
                 let name = format!("{}.{name}", AXIS_NAMES[k]);
-                parameters.push(Parameter { name, start, lower: lower.ln(), upper: upper.ln() });
+                parameters.push(Parameter { name, start, lower: lower.ln(), upper: upper.ln(), prior: None });
             }
         }
         parameters.push(match self.noise {
@@ -110,12 +111,14 @@ impl Problem {
                 start: 1e-4f64.ln(),
                 lower: MIN_NOISE_RATIO.ln(),
                 upper: 10f64.ln(),
+                prior: None,
             },
             Noise::Fixed(noise) => Parameter {
                 name: "signal_variance".into(),
                 start: variance.ln(),
                 lower: (1e-4 * variance).max(noise * 1e-1).ln(),
                 upper: (1e6 * variance).max(noise * 1e1).min(noise / MIN_NOISE_RATIO).ln(),
+                prior: None,
             },
         });
         parameters

@@ -7,7 +7,8 @@ use crate::brdf::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 use crate::sample::space::{InputSpace, WarpedBox};
 use crate::sample::symmetry::Symmetry;
 
-/// The kernel coordinates of every cell's centre, stored as the factors from which they are computed.
+/// The kernel coordinates of every cell's centre, stored as the factors from which they are computed. There
+/// are no such factors in [`InputSpace::PolarAngles`], where only the number of distinct cells is stored.
 ///
 /// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` has the coordinates `first[i]`,
 /// `min(second[l] scale(i, p), limit)` and `third[row(p)]`. In the warped box all cells of a column `(i, p)`
@@ -44,6 +45,14 @@ impl TableGeometry {
                 let rows = if symmetry == Symmetry::Bilateral { COLUMNS } else { N_PHI_D };
                 (theta_d.map(|t| t.powf(exponent)).collect(), limits.collect(), rows)
             }
+            // v without a density says which cells are above the horizon.
+            InputSpace::PolarAngles => {
+                let limits = (0..N_THETA_H * COLUMNS).map(|k| {
+                    let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
+                    theta_d_max(center.theta_h, center.phi_d).recip()
+                });
+                (theta_d.collect(), limits.collect(), COLUMNS)
+            }
             InputSpace::HalfDiff => (theta_d.collect(), vec![1.0; N_THETA_H * COLUMNS], N_PHI_D),
         };
         let limit = if space.stops_at_horizon() { 1.0 } else { f64::INFINITY };
@@ -55,7 +64,7 @@ impl TableGeometry {
                 let phi = (0..rows).map(|p| warped.warp_phi(cell_center(0, 0, p).phi_d));
                 (u.collect(), phi.collect())
             }
-            InputSpace::HalfDiff => (
+            InputSpace::PolarAngles | InputSpace::HalfDiff => (
                 (0..N_THETA_H).map(|i| cell_center(i, 0, 0).theta_h).collect(),
                 (0..rows).map(|p| cell_center(0, 0, p).phi_d).collect(),
             ),

@@ -1,0 +1,291 @@
+//! The search for hyper-parameters of scattered samples, weights of suspected outliers, and leave-one-out
+//! predictions.
+
+use rayon::prelude::*;
+
+use super::conditional::{Process, Scratch};
+use super::conjugate_gradients;
+use super::neighbours::{Embedded, Neighbours, scrambled_order};
+use super::product::Covariance;
+use super::vecchia::{InverseFactor, log_likelihood};
+use super::{NEAREST, ScatteredGp};
+use crate::base::error::Result;
+use crate::gp::problem::{Outliers, Problem};
+use crate::gp::report::FitReport;
+use crate::gp::search::{SearchStart, extent};
+use crate::gp::{LeaveOneOut, OptimizeOptions, Optimum, maximize};
+use crate::kernel::{Kernel, Points};
+
+/// Number of earlier samples that each conditional of the likelihood keeps, for few samples and for many.
+const FEW: (usize, usize) = (1000, 40);
+const MANY: usize = 24;
+
+/// Number of earlier samples that each conditional of the preconditioner keeps, and of the likelihood that is
+/// reported: more of them make fewer products with the covariance.
+const PRECONDITIONER: usize = 48;
+
+/// The likelihood of a search is summed over at most this number of samples, spread evenly over the order. Each
+/// of them is conditioned on the nearest of all samples before it.
+const TERMS: usize = 1000;
+
+/// The largest number of iterations after neighbours or weights have changed.
+const LATER_ITERATIONS: u64 = 12;
+
+/// How often weights of outliers are renewed at most.
+const WEIGHT_ROUNDS: usize = 4;
+
+/// Degrees of freedom of the Student t distribution that gives suspected outliers their weights.
+const DEGREES_OF_FREEDOM: f64 = 4.0;
+
+/// A sample is suspected where the mean square of its standardised leave-one-out residuals exceeds this: six
+/// standard deviations in every channel.
+const SUSPICIOUS: f64 = 36.0;
+
+/// Number of nearest samples with which a suspected one is compared.
+const WITNESSES: usize = 12;
+
+/// Samples in the scrambled order, in which nothing depends on how they were given.
+pub(super) struct Data {
+    /// The place of each sample in the order that was given.
+    order: Vec<u32>,
+    /// Coordinates, rows of three.
+    x: Vec<f64>,
+    /// Targets, one column per channel.
+    y: Vec<Vec<f64>>,
+    /// What is known of the noise variance of each sample.
+    known_noise: Vec<f64>,
+}
+
+/// Hyper-parameters and weights of samples.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub(super) kernel: Kernel,
+    pub(super) noise_variance: f64,
+    /// The weight of each sample, in the scrambled order.
+    weights: Vec<f64>,
+}
+
+impl Data {
+    pub(super) fn new(points: &[[f64; 3]], targets: &[Vec<f64>], known_noise: &[f64]) -> Self {
+        let order = scrambled_order(points.as_flattened(), 3, targets);
+        let sorted = |values: &[f64]| -> Vec<f64> { order.iter().map(|&i| values[i as usize]).collect() };
+        let x = order.iter().flat_map(|&i| points[i as usize]).collect();
+        let y = targets.iter().map(|t| sorted(t)).collect();
+        let known_noise = if known_noise.is_empty() { vec![0.0; order.len()] } else { sorted(known_noise) };
+        Self { order, x, y, known_noise }
+    }
+
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    /// The part of each sample's noise variance that is proportional to the shared one, and the whole.
+    fn noise(&self, noise_variance: f64, weights: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let shared: Vec<f64> = weights.iter().map(|w| noise_variance / w).collect();
+        let all = shared.iter().zip(&self.known_noise).map(|(a, b)| a + b).collect();
+        (shared, all)
+    }
+
+    /// Values of the scrambled order in the order that was given.
+    fn as_given(&self, values: &[f64], width: usize) -> Vec<f64> {
+        let mut out = vec![0.0; values.len()];
+        for (row, &i) in values.chunks(width).zip(&self.order) {
+            out[i as usize * width..(i as usize + 1) * width].copy_from_slice(row);
+        }
+        out
+    }
+}
+
+fn conditioned_on(n: usize) -> usize {
+    if n <= FEW.0 { FEW.1 } else { MANY }
+}
+
+/// Finds hyper-parameters and weights.
+pub(super) fn search(problem: &Problem<'_>, data: &Data) -> Result<(State, FitReport)> {
+    let metrics = problem.space.metrics();
+    let n = data.len();
+    let extents: Vec<f64> = (0..3).map(|k| extent(&data.x, 3, k, metrics[k])).collect();
+    let start = SearchStart::new(
+        data.y.concat().as_slice(),
+        data.y.len(),
+        &extents,
+        &metrics,
+        &problem.kernel[0],
+        problem.noise,
+    );
+    let mut start = if problem.priors { start.with_priors(problem.space.usual_lengths()) } else { start };
+    let mut evaluations = 0;
+    let mut state = State { kernel: start.kernel.clone(), noise_variance: 0.0, weights: vec![1.0; n] };
+    let mut found = maximise(problem, data, &start, &state.kernel, &state.weights, problem.optimize)?;
+    evaluations += found.evaluations;
+    let later = OptimizeOptions {
+        restarts: 0,
+        max_iterations: LATER_ITERATIONS.min(problem.optimize.max_iterations),
+        ..*problem.optimize
+    };
+    for round in 0..WEIGHT_ROUNDS {
+        start.start_from(&found.log_parameters);
+        state.noise_variance = start.set(&mut state.kernel, &found.log_parameters)?;
+        let changed = problem.outliers == Outliers::Downweight && state.renew_weights(data);
+        // Neighbours are those of the length scales that were found; weights are renewed until they stay.
+        if !changed && (round > 0 || n <= conditioned_on(n)) {
+            break;
+        }
+        found = maximise(problem, data, &start, &state.kernel, &state.weights, &later)?;
+        evaluations += found.evaluations;
+    }
+    state.noise_variance = start.set(&mut state.kernel, &found.log_parameters)?;
+    let report = FitReport {
+        log_marginal_likelihood: found.value - found.log_prior,
+        evaluations,
+        converged: found.converged,
+        at_bound: found.at_bound,
+        ..FitReport::default()
+    };
+    Ok((state, report))
+}
+
+/// Maximises the likelihood, with neighbours in the metric of `kernel`.
+fn maximise(
+    problem: &Problem<'_>,
+    data: &Data,
+    start: &SearchStart,
+    kernel: &Kernel,
+    weights: &[f64],
+    options: &OptimizeOptions,
+) -> Result<Optimum> {
+    let n = data.len();
+    let neighbours = Embedded::new(&data.x, kernel).nearest_before(conditioned_on(n));
+    let subset = evenly(n, TERMS);
+    let scale = n as f64 / subset.len() as f64;
+    let mut kernel = kernel.clone();
+    maximize(&start.parameters, n * data.y.len(), options, |p| {
+        problem.watch.evaluation()?;
+        let noise_variance = start.set(&mut kernel, p)?;
+        let (shared, all) = data.noise(noise_variance, weights);
+        let process = Process { kernel: &kernel, x: &data.x, noise: &all, noise_slope: &shared };
+        let (value, mut gradient) = log_likelihood(&process, &data.y, &neighbours, &subset);
+        gradient.truncate(p.len());
+        gradient.iter_mut().for_each(|g| *g *= scale);
+        Ok((scale * value, gradient))
+    })
+}
+
+/// At most `count` of the indices `0..n`, evenly spaced, all where there are no more.
+fn evenly(n: usize, count: usize) -> Vec<u32> {
+    let count = count.min(n);
+    (0..count).map(|k| u32::try_from(k * n / count).unwrap_or(u32::MAX)).collect()
+}
+
+impl State {
+    /// Every sample as it is predicted from the nearest others, in the scrambled order: residuals, rows with one
+    /// value per channel, and variances of a measurement of weight 1.
+    fn leave_one_out(&self, data: &Data) -> (Vec<f64>, Vec<f64>, Neighbours) {
+        let (shared, all) = data.noise(self.noise_variance, &self.weights);
+        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all, noise_slope: &shared };
+        let nearest = Embedded::new(&data.x, &self.kernel).nearest_others(NEAREST);
+        let rows: Vec<(Vec<f64>, f64)> = (0..data.len())
+            .into_par_iter()
+            .map_init(
+                || Scratch::new(NEAREST, &self.kernel),
+                |scratch, i| {
+                    let given = nearest.of(i);
+                    let (b, latent) = scratch.condition(&process, process.point(i), given);
+                    let residual = |y: &Vec<f64>| {
+                        y[i] - b.iter().zip(given).map(|(b, &j)| b * y[j as usize]).sum::<f64>()
+                    };
+                    let residuals = data.y.iter().map(residual).collect();
+                    (residuals, latent + self.noise_variance + data.known_noise[i])
+                },
+            )
+            .collect();
+        let (residuals, variances): (Vec<Vec<f64>>, Vec<f64>) = rows.into_iter().unzip();
+        (residuals.concat(), variances, nearest)
+    }
+
+    /// Gives suspected outliers the weights of Student's t distribution, all others the weight 1. Returns whether
+    /// any weight has changed by more than a factor of 2.
+    fn renew_weights(&mut self, data: &Data) -> bool {
+        let channels = data.y.len();
+        let (residuals, variances, nearest) = self.leave_one_out(data);
+        let square = |i: usize| {
+            let row = &residuals[i * channels..(i + 1) * channels];
+            row.iter().map(|r| r * r).sum::<f64>() / variances[i]
+        };
+        let mean = |i: usize| residuals[i * channels..(i + 1) * channels].iter().sum::<f64>() / channels as f64;
+        let level = |i: usize| data.y.iter().map(|y| y[i]).sum::<f64>() / channels as f64;
+        let mut changed = false;
+        for i in 0..data.len() {
+            let witnesses: Vec<usize> =
+                nearest.of(i).iter().take(WITNESSES).map(|&j| j as usize).collect();
+            // Around a highlight the nearest samples differ from each other, too, and a highlight is brightest
+            // where no other sample is as near to the mirror direction.
+            let mut levels: Vec<f64> = witnesses.iter().map(|&j| level(j)).collect();
+            levels.sort_unstable_by(f64::total_cmp);
+            let spread = if levels.len() > 3 { levels[levels.len() - 2] - levels[1] } else { f64::INFINITY };
+            let first = |i: usize| data.x[3 * i];
+            let is_top = mean(i) > 0.0 && witnesses.iter().all(|&j| first(j) > first(i));
+            let suspected = square(i) > SUSPICIOUS * channels as f64 && mean(i).abs() > spread && !is_top;
+            let weight = if suspected {
+                (DEGREES_OF_FREEDOM + channels as f64) / (DEGREES_OF_FREEDOM + square(i))
+            } else {
+                1.0
+            };
+            let ratio = weight / self.weights[i];
+            changed |= !(0.5..=2.0).contains(&ratio);
+            self.weights[i] = weight;
+        }
+        changed
+    }
+
+    /// Conditions the process. The second value is the log likelihood over all samples.
+    pub(super) fn condition(
+        self,
+        problem: &Problem<'_>,
+        data: &Data,
+        report: &mut FitReport,
+    ) -> Result<(ScatteredGp, f64)> {
+        let n = data.len();
+        let (residuals, variances, _) = self.leave_one_out(data);
+        let density = residuals.chunks(data.y.len()).zip(&variances).map(|(row, v)| {
+            row.iter().map(|r| -0.5 * ((std::f64::consts::TAU * v).ln() + r * r / v)).sum::<f64>()
+        });
+        report.leave_one_out = Some(LeaveOneOut {
+            log_predictive_density: density.sum(),
+            residuals: data.as_given(&residuals, data.y.len()),
+            variances: data.as_given(&variances, 1),
+        });
+        if self.weights.iter().any(|&w| w != 1.0) {
+            report.weights = data.as_given(&self.weights, 1);
+        }
+        let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(PRECONDITIONER);
+        let (shared, all) = data.noise(self.noise_variance, &self.weights);
+        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all, noise_slope: &shared };
+        let (value, _) = log_likelihood(&process, &data.y, &neighbours, &evenly(n, n));
+        let preconditioner = InverseFactor::new(&process, &neighbours);
+        let points = Points::new(&data.x, &self.kernel.metric);
+        let diagonal: Vec<f64> = (0..n).map(|i| process.diagonal(i) - self.kernel.prior_variance()).collect();
+        let covariance = Covariance { kernel: &self.kernel, points: &points, diagonal: &diagonal };
+        let (weights, _) = conjugate_gradients::solve(
+            &covariance,
+            &preconditioner,
+            data.y.concat().as_slice(),
+            &mut |_| problem.watch.evaluation(),
+        )?;
+        let channels = data.y.len();
+        let gp = ScatteredGp::new(
+            self.kernel,
+            self.noise_variance,
+            all,
+            data.x.clone(),
+            channels,
+            weights,
+        )?;
+        Ok((gp, value))
+    }
+
+    /// Known hyper-parameters, with all samples of weight 1.
+    pub(super) fn known(kernel: Kernel, noise_variance: f64, data: &Data) -> Self {
+        Self { kernel, noise_variance, weights: vec![1.0; data.len()] }
+    }
+}

@@ -1,0 +1,256 @@
+use super::conditional::Process;
+use super::fit::{Data, State, search};
+use super::neighbours::Embedded;
+use super::vecchia::log_likelihood;
+use super::*;
+use crate::base::random::SplitMix64;
+use crate::gp::problem::{Observer, Outliers, Problem, Watch};
+use crate::gp::report::{FitReport, Noise};
+use crate::gp::{DenseEvaluator, DenseGp, OptimizeOptions};
+use crate::kernel::{AxisMetric, Shape, test_kernels};
+use crate::sample::space::InputSpace;
+
+const CHANNELS: usize = 3;
+
+/// Pseudo-random points, and targets of a smooth function with noise of standard deviation `noise`.
+fn data(n: usize, noise: f64) -> (Vec<[f64; 3]>, Vec<Vec<f64>>) {
+    let mut random = SplitMix64::new(11);
+    let points: Vec<[f64; 3]> = (0..n).map(|_| std::array::from_fn(|_| random.next_unit())).collect();
+    let mut normal = || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
+    let targets = (0..CHANNELS).map(|c| {
+        let f = |p: &[f64; 3]| (3.0 * p[0] + c as f64).sin() + 0.5 * (2.0 * p[1]).cos() - 0.3 * p[2] * p[2];
+        points.iter().map(|p| f(p) + noise * normal()).collect()
+    });
+    let targets = targets.collect();
+    (points, targets)
+}
+
+fn kernel() -> Kernel {
+    Kernel::ard(1.1, Shape::Matern52, &[0.7, 0.9, 1.3])
+}
+
+/// A search in the unit cube, which the prior's length scales do not fit too badly.
+fn with_problem<R>(targets: &[Vec<f64>], outliers: Outliers, run: impl FnOnce(&Problem<'_>) -> R) -> R {
+    let (observer, optimize) = (Observer::default(), OptimizeOptions::default());
+    let watch = Watch::new(&observer);
+    run(&Problem {
+        angles: &[],
+        lattice: None,
+        targets: targets.to_vec(),
+        space: InputSpace::PolarAngles,
+        kernel: &[vec![Shape::Matern52], vec![Shape::Matern52], vec![Shape::Matern52]],
+        noise: Noise::Optimized,
+        known_noise: &[],
+        priors: true,
+        outliers,
+        optimize: &optimize,
+        watch: &watch,
+    })
+}
+
+fn rows(targets: &[Vec<f64>]) -> Vec<f64> {
+    (0..targets[0].len()).flat_map(|i| targets.iter().map(move |t| t[i])).collect()
+}
+
+#[test]
+fn with_all_earlier_samples_the_likelihood_is_the_exact_one() {
+    let (points, y) = data(40, 0.1);
+    let x = points.as_flattened();
+    for kernel in test_kernels() {
+        let all = Embedded::new(x, &kernel).nearest_before(40);
+        let subset: Vec<u32> = (0..40).collect();
+        let at = |kernel: &Kernel, noise: f64| {
+            let noise = vec![noise; 40];
+            let process = Process { kernel, x, noise: &noise, noise_slope: &noise };
+            log_likelihood(&process, &y, &all, &subset)
+        };
+        let (value, gradient) = at(&kernel, 0.02);
+        let mut exact = DenseEvaluator::new(x, 3, &rows(&y), CHANNELS).unwrap();
+        let expected = exact.evaluate_with_gradient(&kernel, 0.02).unwrap();
+        let scale = expected.log_marginal_likelihood.abs();
+        let name = kernel.name();
+        assert!((value - expected.log_marginal_likelihood).abs() < 1e-6 * scale, "{name}");
+        assert_eq!(gradient.len(), expected.gradient.len());
+        for (g, e) in gradient.iter().zip(&expected.gradient) {
+            assert!((g - e).abs() < 1e-5 * (1.0 + e.abs()), "{name}: {gradient:?} {:?}", expected.gradient);
+        }
+    }
+}
+
+#[test]
+fn gradients_match_finite_differences_where_neighbours_are_few() {
+    let (points, y) = data(80, 0.1);
+    let x = points.as_flattened();
+    let noise_of = |log: f64| -> (Vec<f64>, Vec<f64>) {
+        // Weights and known noise make the noise of each sample its own.
+        let shared: Vec<f64> = (0..80).map(|i| log.exp() * (1.0 + 0.1 * f64::from(i))).collect();
+        let all = shared.iter().enumerate().map(|(i, s)| s + 1e-3 * (i % 3) as f64).collect();
+        (shared, all)
+    };
+    for kernel in [kernel(), Kernel::ard(0.5, Shape::RationalQuadratic { alpha: 0.7 }, &[0.3, 0.5, 0.8])] {
+        let neighbours = Embedded::new(x, &kernel).nearest_before(7);
+        let subset: Vec<u32> = (0..80).step_by(3).collect();
+        let start: Vec<f64> = kernel.log_parameters().into_iter().chain([0.03f64.ln()]).collect();
+        let at = |p: &[f64]| {
+            let mut kernel = kernel.clone();
+            kernel.set_log_parameters(&p[..p.len() - 1]).unwrap();
+            let (shared, all) = noise_of(p[p.len() - 1]);
+            let process = Process { kernel: &kernel, x, noise: &all, noise_slope: &shared };
+            log_likelihood(&process, &y, &neighbours, &subset)
+        };
+        let (_, gradient) = at(&start);
+        for k in 0..start.len() {
+            let shifted = |by: f64| {
+                let mut p = start.clone();
+                p[k] += by;
+                at(&p).0
+            };
+            let slope = (shifted(1e-5) - shifted(-1e-5)) / 2e-5;
+            assert!((gradient[k] - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{k}: {} {slope}", gradient[k]);
+        }
+    }
+}
+
+/// 4,096 directions of a glossy material, with and without noise, beside the dense process with the
+/// hyper-parameters that the search finds.
+#[test]
+fn four_thousand_samples_agree_with_the_dense_process() {
+    let material = crate::brdf::material("blue-metallic-paint").unwrap();
+    let mut random = SplitMix64::new(5);
+    let mut normal = move || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
+    let space = InputSpace::PolarAngles;
+    for noise in [0.03, 0.0] {
+        let set = crate::SampleSet::measure(&*material.brdf, &crate::Layout::Random { count: 4096, seed: 3 });
+        let set = set.unwrap();
+        let points: Vec<[f64; 3]> = set.angles.iter().map(|&a| space.coordinates(a)).collect();
+        let y: Vec<Vec<f64>> = (0..CHANNELS)
+            .map(|c| {
+                let y: Vec<f64> =
+                    set.values.iter().map(|v| (v[c] + 1e-3).ln() + noise * normal()).collect();
+                let mean = y.iter().sum::<f64>() / y.len() as f64;
+                y.into_iter().map(|y| y - mean).collect()
+            })
+            .collect();
+        let (gp, value) = with_problem(&y, Outliers::Keep, |problem| {
+            let data = Data::new(&points, &y, &[]);
+            let (state, mut report) = search(problem, &data).unwrap();
+            state.condition(problem, &data, &mut report).unwrap()
+        });
+        let (kernel, own) = (gp.kernel.clone(), gp.noise_variance);
+        let dense = DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel, own).unwrap();
+        let exact = dense.log_marginal_likelihood().unwrap();
+        assert!((value - exact).abs() < 5e-3 * exact.abs(), "{noise}: {value} {exact}");
+        let at = crate::sample::random_directions(200, 0.97, 9);
+        let test: Vec<f64> = at.iter().flat_map(|&a| space.coordinates(a)).collect();
+        let (mean, expected) = (gp.mean_at(&test), dense.predict_mean(&test).unwrap());
+        let (variance, exact) = (gp.variance_at(&test), dense.predict_variance_latent(&test).unwrap());
+        let mut square = 0.0;
+        for ((mean, expected), exact) in mean.chunks(CHANNELS).zip(expected.chunks(CHANNELS)).zip(&exact) {
+            square += mean.iter().zip(expected).map(|(m, e)| (m - e).powi(2) / exact).sum::<f64>();
+        }
+        let error = (square / mean.len() as f64).sqrt();
+        assert!(error < 0.05, "{noise}: {error}");
+        // Fewer samples know less: the variance is never too small, and hardly too large.
+        let ratios: Vec<f64> = variance.iter().zip(&exact).map(|(v, e)| (v / e).sqrt()).collect();
+        assert!(ratios.iter().all(|r| *r > 1.0 - 1e-4), "{noise} {ratios:?}");
+        let mean_ratio = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        assert!(mean_ratio < 1.2, "{noise}: {mean_ratio}");
+    }
+}
+
+#[test]
+fn few_samples_are_left_out_exactly() {
+    let (points, y) = data(NEAREST, 0.1);
+    let dense =
+        DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel(), 0.01).unwrap().leave_one_out();
+    let dense = dense.unwrap();
+    let mut report = FitReport::default();
+    with_problem(&y, Outliers::Keep, |problem| {
+        let data = Data::new(&points, &y, &[]);
+        State::known(kernel(), 0.01, &data).condition(problem, &data, &mut report).unwrap()
+    });
+    let found = report.leave_one_out.unwrap();
+    for (a, b) in found.residuals.iter().zip(&dense.residuals) {
+        assert!((a - b).abs() < 1e-7, "{a} {b}");
+    }
+    for (a, b) in found.variances.iter().zip(&dense.variances) {
+        assert!((a - b).abs() < 1e-8, "{a} {b}");
+    }
+    assert!((found.log_predictive_density - dense.log_predictive_density).abs() < 1e-4);
+}
+
+#[test]
+fn known_noise_counts_for_its_sample_only() {
+    let (points, y) = data(30, 0.0);
+    let mut known = vec![0.0; 30];
+    known[7] = 1e6;
+    let mean_at = |points: &[[f64; 3]], y: &[Vec<f64>], known: &[f64]| {
+        with_problem(y, Outliers::Keep, |problem| {
+            let data = Data::new(points, y, known);
+            let state = State::known(kernel(), 1e-4, &data);
+            state.condition(problem, &data, &mut FitReport::default()).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
+        })
+    };
+    let without = |v: &[f64]| -> Vec<f64> { v.iter().enumerate().filter(|(i, _)| *i != 7).map(|p| *p.1).collect() };
+    let fewer: Vec<[f64; 3]> = points.iter().enumerate().filter(|(i, _)| *i != 7).map(|p| *p.1).collect();
+    let left: Vec<Vec<f64>> = y.iter().map(|y| without(y)).collect();
+    let (ignored, absent) = (mean_at(&points, &y, &known), mean_at(&fewer, &left, &[]));
+    for (a, b) in ignored.iter().zip(absent) {
+        assert!((a - b).abs() < 1e-3, "{a} {b}");
+    }
+}
+
+#[test]
+fn outliers_are_found_and_nothing_else() {
+    let (points, mut y) = data(600, 0.03);
+    let planted = [5, 77, 301, 444];
+    for (k, &i) in planted.iter().enumerate() {
+        let by = if k % 2 == 0 { 2.3 } else { -2.3 };
+        y.iter_mut().for_each(|y| y[i] += by);
+    }
+    let fit = |outliers| {
+        with_problem(&y, outliers, |problem| {
+            let data = Data::new(&points, &y, &[]);
+            let (state, mut report) = search(problem, &data).unwrap();
+            let (gp, _) = state.condition(problem, &data, &mut report).unwrap();
+            (gp.noise_variance.sqrt(), report)
+        })
+    };
+    let (noise, report) = fit(Outliers::Downweight);
+    assert!((noise / 0.03 - 1.0).abs() < 0.2, "{noise}");
+    let found: Vec<usize> = (0..600).filter(|&i| report.weights[i] < 1.0).collect();
+    assert_eq!(found, planted);
+    let left_out = report.leave_one_out.unwrap();
+    assert!((left_out.residuals[3 * 77] + 2.3).abs() < 0.2, "{}", left_out.residuals[3 * 77]);
+    let (noise, report) = fit(Outliers::Keep);
+    assert!(noise > 0.1 && report.weights.is_empty(), "{noise}");
+}
+
+#[test]
+fn the_order_of_samples_changes_no_bit() {
+    let (points, y) = data(500, 0.05);
+    let fit = |points: &[[f64; 3]], y: &[Vec<f64>]| {
+        with_problem(y, Outliers::Downweight, |problem| {
+            let data = Data::new(points, y, &[]);
+            let (state, mut report) = search(problem, &data).unwrap();
+            let (gp, value) = state.condition(problem, &data, &mut report).unwrap();
+            (gp.mean_at(&[0.1, 0.2, 0.3]), value, gp.kernel)
+        })
+    };
+    let turned: Vec<[f64; 3]> = points.iter().rev().copied().collect();
+    let back: Vec<Vec<f64>> = y.iter().map(|y| y.iter().rev().copied().collect()).collect();
+    assert_eq!(fit(&points, &y), fit(&turned, &back));
+}
+
+#[test]
+fn angles_are_chords_and_broken_parts_are_refused() {
+    let kernel = Kernel {
+        metric: vec![AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord],
+        ..kernel()
+    };
+    let make = |noise: Vec<f64>, weights: usize| {
+        ScatteredGp::new(kernel.clone(), 0.1, noise, vec![0.5; 6], 1, vec![1.0; weights])
+    };
+    assert!(make(vec![0.1; 2], 2).is_ok());
+    assert!(make(vec![0.1; 2], 3).is_err() && make(vec![-0.1; 2], 2).is_err() && make(vec![], 0).is_err());
+}

@@ -1,0 +1,146 @@
+//! The start of a search for the hyper-parameters of samples at any directions: parameters, bounds and priors.
+
+use crate::base::error::Result;
+use crate::gp::hyper::MIN_NOISE_RATIO;
+use crate::gp::report::Noise;
+use crate::gp::{LogNormal, Parameter};
+use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
+
+/// The prior of the noise variance relative to the variance of the targets: a deviation of 1 %, within a factor
+/// of 10 or so.
+const NOISE_PRIOR: (f64, f64) = (1e-4, 2.5);
+
+/// The prior of a signal variance relative to the variance of the targets.
+const VARIANCE_PRIOR: (f64, f64) = (1.0, 2.0);
+
+/// The prior of the mixture parameter of a rational quadratic kernel.
+const ALPHA_PRIOR: (f64, f64) = (1.0, 1.5);
+
+/// A kernel that is a sum of ARD kernels, and the parameters of a search: the kernel's and, where it is
+/// optimised, the noise variance.
+#[derive(Clone, Debug)]
+pub(crate) struct SearchStart {
+    pub(crate) kernel: Kernel,
+    pub(crate) parameters: Vec<Parameter>,
+    noise: Noise,
+    /// Mean square of the targets.
+    variance: f64,
+}
+
+impl SearchStart {
+    /// The usual start for targets of zero mean, `[sample][channel]` or in any other order, whose coordinates
+    /// cover `extents`.
+    pub(crate) fn new(
+        targets: &[f64],
+        channels: usize,
+        extents: &[f64],
+        metrics: &[AxisMetric],
+        shapes: &[Shape],
+        noise: Noise,
+    ) -> Self {
+        let values = targets.len();
+        let variance = (targets.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64).max(1e-12);
+        let kernel = starting_kernel(extents, metrics, shapes, variance);
+        let mut parameters = parameters(&kernel, extents, values / channels, variance);
+        if noise == Noise::Optimized {
+            parameters.push(Parameter {
+                name: "noise_variance".into(),
+                start: (1e-3 * variance).ln(),
+                lower: (MIN_NOISE_RATIO * variance).ln(),
+                upper: (10.0 * variance).ln(),
+                prior: None,
+            });
+        }
+        Self { kernel, parameters, noise, variance }
+    }
+
+    /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the variance
+    /// of the targets, of the noise variance about 1e-4 of it. What the samples determine they hardly change;
+    /// what the samples leave open they decide.
+    pub(crate) fn with_priors(mut self, usual_lengths: [(f64, f64); 3]) -> Self {
+        let terms = self.kernel.terms.len() as f64;
+        let kinds = self.kernel.parameter_kinds();
+        for (k, parameter) in self.parameters.iter_mut().enumerate() {
+            let (median, deviation) = match kinds.get(k) {
+                Some(ParameterKind::LengthScale(axis)) => usual_lengths[(*axis).min(2)],
+                Some(ParameterKind::Variance) => (VARIANCE_PRIOR.0 * self.variance / terms, VARIANCE_PRIOR.1),
+                Some(ParameterKind::Alpha) => ALPHA_PRIOR,
+                Some(ParameterKind::Weight) => (1.0, VARIANCE_PRIOR.1),
+                None => (NOISE_PRIOR.0 * self.variance, NOISE_PRIOR.1),
+            };
+            let prior = LogNormal::new(median, deviation);
+            parameter.prior = Some(prior);
+            // Terms of a sum start apart from each other.
+            if terms == 1.0 && matches!(kinds.get(k), Some(ParameterKind::LengthScale(_))) {
+                parameter.start = prior.log_median.clamp(parameter.lower, parameter.upper);
+            }
+        }
+        let starts: Vec<f64> = self.parameters[..kinds.len()].iter().map(|p| p.start).collect();
+        // The starts are finite, so they are accepted.
+        let _accepted = self.kernel.set_log_parameters(&starts);
+        self
+    }
+
+    /// Starts from these log-parameters, as far as the bounds allow.
+    pub(crate) fn start_from(&mut self, log_parameters: &[f64]) {
+        for (parameter, start) in self.parameters.iter_mut().zip(log_parameters) {
+            parameter.start = start.clamp(parameter.lower, parameter.upper);
+        }
+    }
+
+    /// Sets the parameters of a kernel and returns the noise variance.
+    ///
+    /// # Errors
+    /// Log-parameters whose exponential is zero or not finite.
+    pub(crate) fn set(&self, kernel: &mut Kernel, log_parameters: &[f64]) -> Result<f64> {
+        let count = kernel.n_parameters();
+        kernel.set_log_parameters(&log_parameters[..count])?;
+        Ok(match self.noise {
+            Noise::Optimized => log_parameters[count].exp(),
+            Noise::Fixed(variance) => variance,
+        })
+    }
+}
+
+/// The range that coordinate `k` of the samples covers, at least a small positive number.
+pub(crate) fn extent(x: &[f64], dimension: usize, k: usize, metric: AxisMetric) -> f64 {
+    match metric {
+        AxisMetric::Chord => 1.0,
+        AxisMetric::Linear => {
+            let column = || x.iter().skip(k).step_by(dimension).copied();
+            let (low, high) =
+                (column().fold(f64::INFINITY, f64::min), column().fold(f64::NEG_INFINITY, f64::max));
+            (high - low).max(1e-3)
+        }
+    }
+}
+
+fn starting_kernel(extents: &[f64], metrics: &[AxisMetric], shapes: &[Shape], variance: f64) -> Kernel {
+    let share = variance / shapes.len().max(1) as f64;
+    let terms = shapes.iter().enumerate().map(|(i, &shape)| {
+        // Terms of the same shape must start at different length scales, or they would stay equal.
+        let fraction = 0.5 * 0.5f64.powi(i32::try_from(i).unwrap_or(30));
+        let length_scale = extents.iter().map(|extent| fraction * extent).collect();
+        KernelTerm { variance: share, body: KernelBody::Ard { shape, length_scale } }
+    });
+    Kernel { terms: terms.collect(), metric: metrics.to_vec() }
+}
+
+fn parameters(kernel: &Kernel, extents: &[f64], samples: usize, variance: f64) -> Vec<Parameter> {
+    // Samples cannot tell apart length scales that are shorter than their spacing.
+    let spacing = (samples as f64).powf(-1.0 / extents.len().max(1) as f64).min(0.5);
+    let kinds = kernel.parameter_kinds().into_iter();
+    kinds
+        .zip(kernel.parameter_names())
+        .zip(kernel.log_parameters())
+        .map(|((kind, name), start)| {
+            let (lower, upper) = match kind {
+                ParameterKind::Variance => (1e-4 * variance, 1e6 * variance),
+                ParameterKind::LengthScale(k) => (0.5 * spacing * extents[k], 30.0 * extents[k]),
+                ParameterKind::Alpha => (0.05, 1e3),
+                ParameterKind::Weight => (1e-5, 1e5),
+            };
+            Parameter { name, start, lower: lower.ln(), upper: upper.ln(), prior: None }
+        })
+        .collect()
+}
