@@ -166,7 +166,7 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
 mod tests {
     use super::*;
     use crate::formats::measured::text::samples;
-    use crate::formats::measured::{alta, cornell, zemax};
+    use crate::formats::measured::{alta, astm, cornell, zemax};
     use crate::formats::{exr, merl, model, rgl};
 
     fn head(bytes: &[u8]) -> Result<&'static Format, String> {
@@ -191,6 +191,11 @@ mod tests {
         assert_eq!(head(b"f, Theta_D_rad,phi_d_rad\n"), Ok(&samples::FORMAT));
         assert_eq!(head(b"# num wls\r\n31\r\n"), Ok(&cornell::FORMAT));
         assert_eq!(head(b"1 2 3"), Ok(&cornell::FORMAT));
+        assert_eq!(head(b"# x\n# theta_i phi_i theta_o phi_o f\n1 2 3 4 5\n"), Ok(&samples::FORMAT));
+        assert_eq!(head(b"\xFF\xFEt\0h\0e\0t\0a\0_\0i\0;\0f\0\n\0"), Ok(&samples::FORMAT));
+        assert_eq!(head(b"#SAMPLE \"x\"\n#PARAM_IN CARTESIAN\n1 2 3 4 5 6 7\n"), Ok(&alta::FORMAT));
+        assert_eq!(head(b"# x\nSource Measured\nScatterRadial 2\n"), Ok(&zemax::FORMAT));
+        assert_eq!(head(b"LAB x\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B\n"), Ok(&astm::FORMAT));
     }
 
     #[test]

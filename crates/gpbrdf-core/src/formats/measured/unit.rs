@@ -78,12 +78,13 @@ mod tests {
                 .unit(&Input { format: "x", path: Path::new("x"), bytes: b"", options: &options }, true)
                 .ok()
         };
+        let round = |x: f64, digits: i32| (x * 10f64.powi(digits)).round() / 10f64.powi(digits);
         assert_eq!(unit(&[10.5, 0.3], &[0.0]), Some(AngleUnit::Degrees));
         assert_eq!(unit(&[1.0, 0.0], &[0.0]), Some(AngleUnit::Degrees));
         assert_eq!(unit(&[0.5], &[180.0]), Some(AngleUnit::Degrees));
-        assert_eq!(unit(&[0.5], &[3.14159]), Some(AngleUnit::Radians));
-        assert_eq!(unit(&[0.5], &[-6.283185]), Some(AngleUnit::Radians));
-        assert_eq!(unit(&[0.5], &[3.14]), None);
+        assert_eq!(unit(&[0.5], &[round(PI, 5)]), Some(AngleUnit::Radians));
+        assert_eq!(unit(&[0.5], &[-round(2.0 * PI, 6)]), Some(AngleUnit::Radians));
+        assert_eq!(unit(&[0.5], &[round(PI, 2)]), None);
         assert_eq!(unit(&[0.5, 1.5], &[0.0]), None);
     }
 }

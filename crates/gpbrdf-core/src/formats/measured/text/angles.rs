@@ -152,6 +152,45 @@ impl Angles {
         Ok(Directed { wi, wo, half_diff: HalfDiff::from_directions(&wi, &wo) })
     }
 
+    /// Takes the `phi` of all rows as the angles from the normal if nothing else is possible: a `theta` of more
+    /// than half a turn is no angle from the normal in transmission either, and each `phi` is one.
+    ///
+    /// # Errors
+    /// Those of [`Angles::find`].
+    pub(crate) fn settle_zenith(
+        &mut self,
+        input: &Input<'_>,
+        header: &Header,
+        rows: &mut [[f64; 4]],
+    ) -> Result<bool> {
+        if self.angles != LIGHT_VIEWER {
+            return Ok(false);
+        }
+        let unit = self.unit(input)?;
+        let most = |columns: [usize; 2]| {
+            let all = rows.iter().flat_map(|row| columns.map(|k| unit.to_radians(row[k]).abs()));
+            all.fold(0.0, f64::max)
+        };
+        if most([0, 2]) <= PI + ROUNDING || most([1, 3]) > FRAC_PI_2 + ROUNDING {
+            return Ok(false);
+        }
+        let mut swapped = Self::find(input, header, Zenith::Phi, &[])?;
+        let columns = |angles: &Self, order: [usize; 4]| {
+            order.map(
+                |k| if let Some(Place::Column(index)) = angles.places.get(k) { Some(*index) } else { None },
+            )
+        };
+        if columns(&swapped, [0, 1, 2, 3]) != columns(self, [1, 0, 3, 2]) {
+            return Ok(false);
+        }
+        for row in rows {
+            *row = [row[1], row[0], row[3], row[2]];
+            swapped.observe(*row);
+        }
+        *self = swapped;
+        Ok(true)
+    }
+
     /// What may be wrong with an angle from the normal that is too large.
     fn hint(&self, header: &Header, k: usize) -> &'static str {
         let is_theta =

@@ -112,8 +112,6 @@ pub(crate) fn angle(name: &Name, zenith: Zenith) -> Option<Angle> {
         "saa" => return Some(Angle::Azimuth(Side::Incident)),
         "vza" => return Some(Angle::Zenith(Side::Outgoing)),
         "vaa" => return Some(Angle::Azimuth(Side::Outgoing)),
-        // This is short for azimuth, not the azimuth of the incident direction.
-        "azi" => return None,
         word if DIFFERENCES.contains(&word) => return Some(Angle::Difference),
         _ => {}
     }

@@ -16,7 +16,7 @@ pub(crate) fn comment(line: &str) -> Option<&str> {
 }
 
 /// What comments say about which angle is measured from the normal, and on which line they say it first.
-/// Understood are sentences such as "(phi_i, theta_i) are the zenith and azimuth angles" and "phi: zenith".
+/// Understood are sentences such as `(phi_i, theta_i) are the zenith and azimuth angles` and `phi: zenith`.
 ///
 /// # Errors
 /// The lines of two statements that contradict each other.

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
 use crate::formats::measured::input::Input;
-use crate::formats::measured::options::ReadOptions;
+use crate::formats::measured::options::{ReadOptions, Zenith};
 use crate::formats::measured::text::angles::{Angles, Place};
 use crate::formats::measured::text::number::Marks;
 use crate::formats::measured::text::samples::{LIMIT_BYTES, NAME, row_of_angles, zenith_of};
@@ -62,19 +62,23 @@ fn parse(input: &Input<'_>) -> Result<Directions> {
     };
     let mut directions = Directions { columns: texts(&header.names), ..Directions::default() };
     let mut marks = Marks::default();
-    let mut rows = Vec::new();
+    let (mut lines, mut rows) = (Vec::new(), Vec::new());
     table.each(input, |line, fields| {
         let found = row_of_angles(input, header, &angles, &mut marks, fields, line)?;
         angles.observe(found);
-        rows.push((line, found));
+        lines.push(line);
+        rows.push(found);
         directions.rows.push(texts(fields));
         Ok(())
     })?;
     if let Some((expected, found)) = marks.doubt() {
         return Err(input.wrong(expected, found));
     }
+    if zenith == Zenith::Theta && input.options.zenith.is_none() {
+        angles.settle_zenith(input, header, &mut rows)?;
+    }
     let unit = angles.unit(input)?;
-    for (line, row) in rows {
+    for (line, row) in lines.into_iter().zip(rows) {
         let directed = angles.directions(input, header, unit, row, line)?;
         if !(directed.wi.z.min(directed.wo.z) > 1e-12) {
             return Err(input

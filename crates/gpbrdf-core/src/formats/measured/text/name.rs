@@ -29,7 +29,7 @@ impl Name {
                 _ => {}
             }
         }
-        Self { word, unit: unit.replace('µ', "u").replace('μ', "u") }
+        Self { word, unit: unit.replace(['µ', 'μ'], "u") }
     }
 }
 

@@ -46,6 +46,9 @@ pub(crate) const NAME: &str = "samples CSV";
 /// The largest file that is read.
 pub(crate) const LIMIT_BYTES: u64 = 1 << 30;
 
+/// What users are told where `phi` is taken as the zenith angle.
+const PHI_IS_ZENITH: &str = "`phi` is taken as the angle from the normal and `theta` as the azimuth";
+
 /// Whether a text is a table of samples or directions: its first line that is no comment, or one soon after,
 /// names an angle or is a row of a table that lacks its header.
 fn looks_like_samples(text: &str) -> bool {
@@ -147,6 +150,15 @@ pub(crate) fn samples(
     })?;
     if let Some((expected, found)) = marks.doubt() {
         return Err(input.wrong(expected, found));
+    }
+    if zenith == Zenith::Theta
+        && input.options.zenith.is_none()
+        && constants.is_empty()
+        && angles.settle_zenith(&input, header, &mut row_angles)?
+    {
+        collector.notice(format!(
+            "{PHI_IS_ZENITH}, as no `theta` beyond 180 degrees can be measured from the normal"
+        ));
     }
     let unit = angles.unit(&input)?;
     let mut colours = Colours::new(&input, &columns, header, &numbers, &mut collector)?;

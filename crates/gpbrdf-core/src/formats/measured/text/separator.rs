@@ -46,7 +46,7 @@ impl Separator {
                     .from_reader(line.as_bytes());
                 let mut record = csv::StringRecord::new();
                 if reader.read_record(&mut record).is_ok() {
-                    fields.extend(record.iter().map(str::to_owned));
+                    fields.extend(record.iter().map(|field| unquoted(field).to_owned()));
                 }
             }
             Some(sign) => fields.extend(line.split(sign).map(|field| field.trim().to_owned())),
@@ -75,6 +75,11 @@ impl Separator {
     }
 }
 
+/// A field without the quotes that a blank before them kept.
+fn unquoted(field: &str) -> &str {
+    field.strip_prefix('"').and_then(|field| field.strip_suffix('"')).unwrap_or(field)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,7 +92,10 @@ mod tests {
             fields
         };
         assert_eq!(split(Separator::Semicolon, "1,5; 2 ;;"), ["1,5", "2", "", ""]);
-        assert_eq!(split(Separator::Comma, "\"a, b\" , \"say \"\"c\"\"\""), ["a, b", "say \"c\""]);
+        assert_eq!(
+            split(Separator::Comma, "\"a, b\", \"c\" , \"say \"\"d\"\"\""),
+            ["a, b", "c", "say \"\"d\"\""]
+        );
         assert_eq!(split(Separator::Tab, "1\t\t2"), ["1", "", "2"]);
         assert_eq!(split(Separator::Blank, " 1   2\t3 "), ["1", "2", "3"]);
         assert_eq!(Separator::Blank.split_header("theta_i [deg]  f (1/sr)"), ["theta_i [deg]", "f (1/sr)"]);

@@ -1,4 +1,4 @@
-//! The tabular BSDF format of Zemax OpticStudio and of Radiant's Imaging Sphere.
+//! The tabular BSDF format of Zemax and of Radiant's Imaging Sphere.
 //!
 //! A text with four lists of angles in degrees: rotations of the sample, angles of incidence, and for each of
 //! them azimuthal and radial angles about the specular direction. The values follow, one line for each azimuth,

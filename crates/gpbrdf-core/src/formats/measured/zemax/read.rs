@@ -371,6 +371,6 @@ mod tests {
         }
         assert_eq!(widest.len(), 13);
         assert!(widest.values().all(|angle| (83.0..85.5).contains(angle)), "{widest:?}");
-        assert_eq!((found.values[0], found.lines[0]), ([6.375e-2; 3], 18));
+        assert_eq!((found.values[0], found.lines[0]), ([6.375e-2; 3], 19));
     }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
-use crate::brdf::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 use crate::formats::measured::spectrum::xyz_from_srgb;
 use crate::formats::measured::zemax::frame::Frame;
@@ -35,6 +34,9 @@ pub struct SpecularTable {
 
 /// Directions whose cosine is smaller are written as not measured.
 const LEAST_COSINE: f64 = 1e-3;
+
+/// Number of steps between neighbours of a grid in sums.
+const STEPS: u32 = 8;
 
 /// Samples whose angles differ by less have the same angle, in degrees.
 const SAME: f64 = 1e-4;
@@ -72,7 +74,7 @@ impl SpecularTable {
                     values.push(if wo.z < LEAST_COSINE {
                         [0.0; 3]
                     } else {
-                        let value = brdf.eval_half_diff(HalfDiff::from_directions(&frame.wi, &wo));
+                        let value = brdf.eval(&frame.wi, &wo);
                         value.map(|x| if x.is_finite() { x.max(0.0) } else { 0.0 })
                     });
                 }
@@ -151,23 +153,32 @@ impl SpecularTable {
         Ok(Self { grid, values, description: samples.description.clone() })
     }
 
-    /// The total integrated scatter `integral f cos(theta_o) domega` of one channel at an angle of incidence, by
-    /// the trapezoidal rule.
+    /// The total integrated scatter `integral f cos(theta_o) domega` of one channel at an angle of incidence.
+    /// Between radial angles `f` is linear, and up to the horizon it is constant.
     fn total(&self, incidence: usize, channel: &dyn Fn(&Rgb) -> f64) -> f64 {
         let SpecularGrid { incidences, azimuths, radials } = &self.grid;
         let frame = Frame::new(incidences[incidence].to_radians());
         let mut total = 0.0;
         let mut covered = 0.0;
         for (a, azimuth) in azimuths.iter().enumerate() {
-            let of = |r: usize| {
-                let radial = radials[r].to_radians();
-                let cos = frame.direction(radial, azimuth.to_radians()).z.max(0.0);
-                let value = &self.values[(incidence * azimuths.len() + a) * radials.len() + r];
-                channel(value) * cos * radial.sin()
-            };
-            let ring: f64 = (1..radials.len())
-                .map(|r| 0.5 * (of(r - 1) + of(r)) * (radials[r] - radials[r - 1]).to_radians())
-                .sum();
+            let cosine = |radial: f64| frame.direction(radial, azimuth.to_radians()).z;
+            let mut ring = 0.0;
+            for r in 1..radials.len() {
+                let (from, to) = (radials[r - 1].to_radians(), radials[r].to_radians());
+                let row = (incidence * azimuths.len() + a) * radials.len();
+                let [mut inner, mut outer] = [r - 1, r].map(|r| channel(&self.values[row + r]));
+                if cosine(to) < LEAST_COSINE {
+                    outer = inner;
+                } else if cosine(from) < LEAST_COSINE {
+                    inner = outer;
+                }
+                for step in 0..STEPS {
+                    let part = (f64::from(step) + 0.5) / f64::from(STEPS);
+                    let radial = from + part * (to - from);
+                    let value = inner + part * (outer - inner);
+                    ring += value * cosine(radial).max(0.0) * radial.sin() * (to - from) / f64::from(STEPS);
+                }
+            }
             let before = a.checked_sub(1).map_or(0.0, |b| azimuth - azimuths[b]);
             let after = azimuths.get(a + 1).map_or(0.0, |next| next - azimuth);
             let width = 0.5 * (before + after);
@@ -305,7 +316,7 @@ mod tests {
     fn the_total_of_a_perfect_diffuser_is_one() {
         struct White;
         impl Brdf for White {
-            fn eval_half_diff(&self, _: HalfDiff) -> Rgb {
+            fn eval(&self, _: &nalgebra::Vector3<f64>, _: &nalgebra::Vector3<f64>) -> Rgb {
                 [std::f64::consts::FRAC_1_PI; 3]
             }
         }

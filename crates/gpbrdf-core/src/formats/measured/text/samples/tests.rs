@@ -239,8 +239,23 @@ fn comments_say_which_angle_is_the_zenith() {
     assert_eq!((found.len(), found.description.as_str()), (1, "red"));
     let expected = direction(30f64.to_radians(), std::f64::consts::PI);
     assert!((found.directions[0][1] - expected).norm() < 1e-15);
-    assert!(found.notices[0].starts_with("`phi` is the angle from the normal"), "{:?}", found.notices);
+    assert!(
+        found.notices[0].starts_with("`phi` is taken as the angle from the normal"),
+        "{:?}",
+        found.notices
+    );
     assert!(found.notices[1].starts_with("1 row has a direction at the horizon"), "{:?}", found.notices);
+    // Beyond half a turn, `theta` cannot be measured from the normal.
+    let found = parse("theta_i,phi_i,theta_o,phi_o,f\n180,30,337,60,1\n180,30,10,5,1\n").unwrap();
+    let degrees = |theta: f64, phi: f64| direction(theta.to_radians(), phi.to_radians());
+    assert!((found.directions[0][1] - degrees(60.0, 337.0)).norm() < 1e-15);
+    assert!(found.notices[0].contains("beyond 180 degrees"), "{:?}", found.notices);
+    for text in ["180,30,170,60", "180,30,337,100"] {
+        let text = format!("theta_i,phi_i,theta_o,phi_o,f\n{text},1\n");
+        assert!(error(&text).contains("--zenith phi"), "{text}");
+        let options = ReadOptions { zenith: Some(Zenith::Theta), ..ReadOptions::default() };
+        assert!(parse_with(text.as_bytes(), &options).is_err());
+    }
 }
 
 #[test]
@@ -345,7 +360,7 @@ fn measured_tables_are_read() {
     let chassis = open("chassis_brdf.csv");
     // 724 rows, of which 8 are at the horizon.
     assert_eq!(chassis.len(), 716);
-    let ([wi, wo], value) = at(&chassis, 15);
+    let ([wi, wo], value) = at(&chassis, 16);
     assert!((wi - degrees(75.0, 180.0)).norm() < 1e-12 && (wo - degrees(89.0, 180.0)).norm() < 1e-12);
     assert_eq!(value, 1.56196e-4);
     let largest = chassis.values.iter().flatten().copied().fold(0.0, f64::max);
