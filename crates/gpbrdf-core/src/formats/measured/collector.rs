@@ -9,8 +9,11 @@ use crate::formats::measured::lines::Lines;
 use crate::formats::measured::options::ValueKind;
 use crate::sample::{Sample, SampleSet};
 
-/// A negative value is taken as the noise of a dark signal down to this share of the largest value.
+/// A negative value is taken as the noise of a dark signal down to this share of the largest value, but not
+/// beyond the median.
 const DARK_SHARE: f64 = 1e-3;
+/// Or down to this share of the largest value, where the median is smaller: detectors do not resolve it.
+const LEAST_SHARE: f64 = 1e-5;
 /// Or down to this number of its own standard deviations.
 const DARK_SIGMAS: f64 = 5.0;
 
@@ -50,7 +53,8 @@ pub(crate) struct Collector<'a> {
     horizon: Lines,
     /// Negative numbers as they are in the file: line, number, standard deviation.
     negative: Vec<(u64, f64, f64)>,
-    largest: f64,
+    /// All positive numbers.
+    positive: Vec<f64>,
     notices: Vec<String>,
 }
 
@@ -63,7 +67,7 @@ impl<'a> Collector<'a> {
             set: SampleSet::default(),
             horizon: Lines::default(),
             negative: Vec::new(),
-            largest: 0.0,
+            positive: Vec::new(),
             notices: Vec::new(),
         }
     }
@@ -96,9 +100,10 @@ impl<'a> Collector<'a> {
         }
         let raw_sigma = sigma.map_or(0.0, |sigma| sigma.into_iter().fold(0.0, f64::max));
         for &number in raw {
-            self.largest = self.largest.max(number);
             if number < 0.0 {
                 self.negative.push((line, number, raw_sigma));
+            } else if number > 0.0 {
+                self.positive.push(number);
             }
         }
         let scale = self.kind.to_brdf(wo.z);
@@ -148,15 +153,22 @@ impl<'a> Collector<'a> {
 
     /// Refuses negative values that are no noise, and says which ones are kept.
     fn check_negative(&mut self) -> Result<()> {
+        if self.negative.is_empty() {
+            return Ok(());
+        }
+        self.positive.sort_by(f64::total_cmp);
+        let largest = self.positive.last().copied().unwrap_or(0.0);
+        let median = self.positive.get(self.positive.len() / 2).copied().unwrap_or(0.0);
+        let dark = (DARK_SHARE * largest).min(median.max(LEAST_SHARE * largest));
         let mut lines = Lines::default();
         let mut smallest = 0.0f64;
         for &(line, number, sigma) in &self.negative {
-            let limit = -(DARK_SHARE * self.largest).max(DARK_SIGMAS * sigma);
+            let limit = -dark.max(DARK_SIGMAS * sigma);
             if number < limit {
                 return Err(self.input.wrong(
                     format!(
-                        "values of at least {limit} (noise of a dark signal) on line {line}, as {} is the largest",
-                        self.largest
+                        "values of at least {limit} (noise of a dark signal) on line {line}, as {largest} is \
+                         the largest"
                     ),
                     number.to_string(),
                 ));
@@ -164,16 +176,14 @@ impl<'a> Collector<'a> {
             lines.push(line);
             smallest = smallest.min(number);
         }
-        if lines.count > 0 {
-            let one = lines.count == 1;
-            self.notices.push(format!(
-                "{} value{} negative, down to {smallest} ({}); {} kept as noise of a dark signal",
-                lines.count,
-                if one { " is" } else { "s are" },
-                lines.named(),
-                if one { "it is" } else { "they are" },
-            ));
-        }
+        let one = lines.count == 1;
+        self.notices.push(format!(
+            "{} value{} negative, down to {smallest} ({}); {} kept as noise of a dark signal",
+            lines.count,
+            if one { " is" } else { "s are" },
+            lines.named(),
+            if one { "it is" } else { "they are" },
+        ));
         Ok(())
     }
 }
@@ -229,6 +239,12 @@ mod tests {
             found.contains("at least -0.01 (noise of a dark signal) on line 2") && found.contains("-0.02")
         );
         assert!(collect(ReadOptions::default(), &rows(-0.02, Sigma::Absolute([0.005; 3]))).is_ok());
+        // One bright peak says little about the noise of dark values.
+        let peak = |dark: f64| {
+            let rows = [(0.1, 1e5), (0.2, 0.02), (0.3, 0.01), (0.4, dark)];
+            collect(ReadOptions::default(), &rows.map(|(theta, value)| (theta, value, Sigma::Unknown)))
+        };
+        assert!(peak(-0.5).is_ok() && peak(-50.0).is_err());
     }
 
     #[test]

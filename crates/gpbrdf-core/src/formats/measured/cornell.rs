@@ -38,8 +38,8 @@ const MAX_WAVELENGTHS: usize = 10_000;
 /// under D65; out-of-gamut channels are set to 0.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`], which names the line, when it is not of
-/// this format, a number is not finite or a direction is below the horizon.
+/// [`Error::Io`](crate::Error::Io) when the file cannot be read; [`Error::Format`](crate::Error::Format), which
+/// names the line, when it is not of this format, a number is not finite or a direction is below the horizon.
 pub fn read_cornell(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
     let bytes = read_bytes(path, NAME, LIMIT_BYTES)?;

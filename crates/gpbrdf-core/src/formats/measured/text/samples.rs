@@ -11,8 +11,8 @@
 //! - standard deviations, if there are any: `sigma` or `sigma_r, sigma_g, sigma_b` in the unit of the values,
 //!   or `sigma_rel`.
 //!
-//! The unit of an angle is part of its name, as in `theta_i_deg`, `theta_i [rad]`, or in a row below the names. A
-//! bare `theta_i` is in degrees; where all angles could as well be radians, the file is refused. All angles of
+//! The unit of an angle is part of its name, as in `theta_i_deg`, `theta_i [rad]`, or in a row below the names.
+//! A bare `theta_i` is in degrees; where all angles could as well be radians, the file is refused. All angles of
 //! a file must have the same unit.
 
 use std::path::Path;
@@ -29,7 +29,9 @@ use crate::formats::measured::text::columns::Angle;
 use crate::formats::measured::text::comment::{comment, said, zenith};
 use crate::formats::measured::text::number::Marks;
 use crate::formats::measured::text::table::{Header, Table, count_in, is_header_or_row};
-use crate::formats::measured::text::values::{SigmaColumns, ValueColumns, Values, value_columns};
+use crate::formats::measured::text::values::{
+    SigmaColumns, ValueColumns, Values, unused_uncertainty, value_columns,
+};
 use crate::formats::read::read_bytes;
 use crate::sample::SampleSet;
 
@@ -93,8 +95,7 @@ pub(crate) fn zenith_of(input: &Input<'_>, table: &Table<'_>) -> Result<(Zenith,
     match zenith(table.comments.iter().copied()) {
         Ok(None | Some((Zenith::Theta, _))) => Ok((Zenith::Theta, None)),
         Ok(Some((Zenith::Phi, line))) => {
-            let said =
-                format!("`phi` is the angle from the normal and `theta` the azimuth, as line {line} says");
+            let said = format!("{PHI_IS_ZENITH}, as line {line} says");
             Ok((Zenith::Phi, Some(said)))
         }
         Err([first, second]) => Err(input.wrong(
@@ -122,7 +123,8 @@ pub(crate) fn samples(
     let columns = value_columns(&input, header, &of_angles, allow_xyz)?;
     let indices = columns.indices();
     let mut collector = Collector::new(input, columns.kind);
-    notice.into_iter().for_each(|notice| collector.notice(notice));
+    let unused = unused_uncertainty(header, &columns);
+    notice.into_iter().chain(unused).for_each(|notice| collector.notice(notice));
 
     let mut marks = Marks::default();
     let mut lines = Vec::new();
@@ -328,11 +330,14 @@ impl<'a> Colours<'a> {
         if wavelength != expected || self.open.is_some_and(|(open, _)| open != angles) {
             return Err(input.wrong(
                 format!(
-                    "on line {line} a row for {expected} nm, as each direction has a row for each of {} wavelengths \
-                     in increasing order",
+                    "on line {line} a row for {expected} nm, as each direction has a row for each of {} \
+                     wavelengths in increasing order",
                     self.wavelengths.len()
                 ),
-                format!("{wavelength} nm{}", if wavelength == expected { " of another direction" } else { "" }),
+                format!(
+                    "{wavelength} nm{}",
+                    if wavelength == expected { " of another direction" } else { "" }
+                ),
             ));
         }
         self.open = Some((angles, line));

@@ -1,7 +1,7 @@
 //! Which columns hold values and their standard deviations, by the names that people give them.
 
 use crate::base::error::Result;
-use crate::formats::measured::input::Input;
+use crate::formats::measured::input::{Input, shortened};
 use crate::formats::measured::options::ValueKind;
 use crate::formats::measured::text::name::Name;
 use crate::formats::measured::text::table::Header;
@@ -169,6 +169,18 @@ pub(crate) fn value_columns(
     };
     check_kind(input, header, &columns, said)?;
     Ok(columns)
+}
+
+/// A column that may hold standard deviations and is not used, as its name does not say so.
+pub(crate) fn unused_uncertainty(header: &Header, columns: &ValueColumns) -> Option<String> {
+    let is_one = |name: &&String| {
+        matches!(Name::new(name).word.as_str(), "uncertainty" | "unc" | "error" | "err" | "deltaf")
+    };
+    let found = header.names.iter().find(is_one).filter(|_| columns.sigma == SigmaColumns::None)?;
+    Some(format!(
+        "the column `{}` is not used; call it `sigma` or `sigma_rel` if it is one standard deviation",
+        shortened(found)
+    ))
 }
 
 /// Refuses values of which neither the name nor the unit nor an option says what they are.

@@ -259,8 +259,8 @@ pub(super) fn parse(input: Input<'_>) -> Result<SampleSet> {
     }
     if unmeasured > 0 {
         samples.notice(format!(
-            "{unmeasured} values above the horizon are 0, which stands for directions that were not measured; they \
-             are left out"
+            "{unmeasured} values above the horizon are 0, which stands for directions that were not measured; \
+             they are left out"
         ));
     }
     let comments: Vec<&str> =
@@ -280,8 +280,8 @@ mod tests {
 
     const SMALL: &str = "# Vinyl\nSource  Measured\nSymmetry PlaneSymmetrical\nSpectralContent Monochrome\n\
         ScatterType BRDF\nSampleRotation 1\n0\nAngleOfIncidence 2\n10 30\nScatterAzimuth 3\n0 90 180\n\
-        ScatterRadial 3\n0 30 70\n\nMonochrome\nDataBegin\nTIS 0.5\n1 2 3\n1 4 5\n1 6 0\nTIS 0.6\n7 8 9\n7 10 11\n\
-        7 12 0\nDataEnd\n";
+        ScatterRadial 3\n0 30 70\n\nMonochrome\nDataBegin\nTIS 0.5\n1 2 3\n1 4 5\n1 6 0\nTIS 0.6\n7 8 9\n\
+        7 10 11\n7 12 0\nDataEnd\n";
 
     fn read(text: &[u8]) -> Result<SampleSet, String> {
         parse(Input { format: NAME, path: Path::new("x"), bytes: text, options: &ReadOptions::default() })

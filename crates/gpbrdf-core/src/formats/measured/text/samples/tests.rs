@@ -130,8 +130,8 @@ fn mistakes_are_named_with_line_and_column() {
     );
     assert_eq!(
         row("1,2,95,4,5,6,7"),
-        "an angle from -90 to 90 degrees (above the horizon) in column `theta_o` on line 4, found 95 degrees; if \
-         `phi` is the angle from the normal, say --zenith phi"
+        "an angle from -90 to 90 degrees (above the horizon) in column `theta_o` on line 4, found 95 degrees; \
+         if `phi` is the angle from the normal, say --zenith phi"
     );
     assert!(row("1,400,3,4,5,6,7").contains("column `phi_i` on line 4, found 400 degrees"));
     assert_eq!(
@@ -232,8 +232,25 @@ fn options_settle_what_is_not_certain() {
 }
 
 #[test]
+fn standard_deviations_are_read_in_every_form() {
+    for (columns, row, expected) in [
+        ("f,sigma", "2,0.25", [0.25; 3]),
+        ("f,std", "2,0.5", [0.5; 3]),
+        ("f,sigma_rel", "2,0.05", [0.1; 3]),
+        ("f,sigma_rel [%]", "2,5", [0.1; 3]),
+        ("r,g,b,sigma_r,sigma_g,sigma_b", "1,2,3,0.1,0.2,0.3", [0.1, 0.2, 0.3]),
+        ("r,g,b,sigma_rel", "1,2,-0.001,0.5", [0.5, 1.0, 5e-4]),
+    ] {
+        let found = parse(&format!("theta_i,phi_i,theta_o,phi_o,{columns}\n10,0,20,180,{row}\n")).unwrap();
+        (0..3).for_each(|c| assert!((found.sigma[0][c] - expected[c]).abs() < 1e-15, "{columns}"));
+    }
+    let found = parse("theta_i,phi_i,theta_o,phi_o,f,uncertainty\n10,0,20,180,2,1\n").unwrap();
+    assert!(found.sigma.is_empty() && found.notices[0].contains("`uncertainty` is not used"));
+}
+
+#[test]
 fn comments_say_which_angle_is_the_zenith() {
-    let text = "# red\n# (phi_i, theta_i) are the zenith and azimuth angles\n# phi_i theta_i phi_o theta_o brdf\n\
+    let text = "# red\n# (phi_i, theta_i) are the zenith and azimuth angles\n# phi_i theta_i phi_o theta_o f\n\
         75.0 -180.0 -90.0 0.0 1e-4\n75.0 -180.0 -30.0 0.0 0.5\n";
     let found = parse(text).unwrap();
     assert_eq!((found.len(), found.description.as_str()), (1, "red"));
