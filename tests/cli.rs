@@ -10,6 +10,7 @@ mod cli {
     mod dense;
     mod device;
     mod inducing;
+    mod instruments;
     mod measured;
     mod odd_input;
     mod process;

@@ -24,7 +24,8 @@ fn merl() -> &'static [u8] {
     })
 }
 
-const KINDS: &str = "one of RGL .bsdf, table EXR, gpbrdf model, samples CSV, Cornell .brdf, MERL .binary";
+const KINDS: &str = "one of RGL .bsdf, table EXR, gpbrdf model, Zemax .bsdf, ALTA text, ASTM E1392, samples CSV, \
+    Cornell .brdf, MERL .binary";
 
 #[test]
 fn what_is_no_measurement() {
@@ -61,7 +62,11 @@ fn what_cannot_be_opened() {
     let cli = Cli::new();
     symlink("nowhere", cli.path("dangling")).unwrap();
     refused(&cli, "dangling", "cannot read \"dangling\": No such file or directory (os error 2)");
-    refused(&cli, "/dev/null", "\"/dev/null\": expected a regular file, found a pipe or a device");
+    refused(
+        &cli,
+        "/dev/null",
+        "\"/dev/null\": expected a regular file, or - for standard input, found a pipe or a device",
+    );
     cli.write("locked.csv", "theta_i,phi_i,theta_o,phi_o,f\n1,2,3,4,5\n");
     std::fs::set_permissions(cli.path("locked.csv"), std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::File::open(cli.path("locked.csv")).is_ok() {
@@ -198,12 +203,11 @@ fn damaged_samples() {
     for (text, message) in [
         ("1,2,3,4,5,x,7\n", "a finite number in column `g` on line 2, found \"x\""),
         ("1,2,3,4,5,1e400,7\n", "a finite number in column `g` on line 2, found \"1e400\""),
+        ("1,2,90,4,5,6,7\n", "at least one sample above the horizon, found rows at the horizon only"),
         (
-            "1,2,90,4,5,6,7\n",
-            "an angle of from 0 to under 90 (above the horizon) degrees in column `theta_o` on line 2, \
-             found 90 degrees",
+            "1,2,3,4,-5,6,7\n",
+            "values of at least -0.007 (noise of a dark signal) on line 2, as 7 is the largest, found -5",
         ),
-        ("1,2,3,4,-5,6,7\n", "a value of at least 0 in column `r` on line 2, found -5"),
         ("1,2,3\n", "a finite number in column `phi_o` on line 2, found only 3 columns"),
         ("", "at least one row, found a header only"),
     ] {

@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use gpbrdf_core::formats::write_samples_csv;
-use gpbrdf_core::{FitOptions, IntervalOf, Layout, Model, SampleSet, Source, fit};
+use gpbrdf_core::{FitOptions, IntervalOf, Layout, Model, Source, fit};
 
 type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
@@ -46,12 +46,7 @@ fn run(file: &Path, model_file: &Path) -> Result {
     let part = |kept_back: bool| {
         let chosen = |i: &usize| i.is_multiple_of(KEPT_BACK) == kept_back;
         let indices: Vec<usize> = (0..measured.len()).filter(chosen).collect();
-        SampleSet {
-            angles: indices.iter().map(|&i| measured.angles[i]).collect(),
-            values: indices.iter().map(|&i| measured.values[i]).collect(),
-            origin: measured.origin.clone(),
-            ..SampleSet::default()
-        }
+        measured.subset(&indices)
     };
     let (known, unknown) = (part(false), part(true));
 

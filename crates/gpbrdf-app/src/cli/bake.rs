@@ -14,6 +14,7 @@ use gpbrdf_core::judge::render_env;
 use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
 use super::input::{environment, open};
+use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{Backend, Baked, Baking, Job, Judging, ModelSpec, Outcome, Report, Run, Stage, Truth};
 use crate::output::OutputFolder;
@@ -23,12 +24,15 @@ const PICTURE_SIZE: usize = 160;
 
 #[derive(Args, Debug)]
 pub(crate) struct Bake {
-    /// A measurement, table or model file, or the name of a built-in material.
+    /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
+    /// standard input.
     #[arg(default_value = "cherry-235")]
     input: PathBuf,
     /// Folder for the outputs; made if need be.
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-out")]
     output: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     #[command(flatten)]
     model: ModelSpec,
     /// Where to bake.
@@ -55,7 +59,7 @@ impl Bake {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let mut run = Run::new(terminal.clone());
         OutputFolder::check(&self.output)?;
-        let source = run.stage(Stage::Load, || open(&self.input))?;
+        let source = run.stage(Stage::Load, || open(&self.input, self.reading, terminal))?;
         self.model.check(&source)?;
         let environment = environment(self.env.as_deref())?;
         let is_compared = !(self.no_metrics && self.no_images);

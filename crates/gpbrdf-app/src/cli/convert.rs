@@ -1,59 +1,117 @@
-//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr` or `.csv`.
+//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.csv` or Zemax `.bsdf`.
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use clap::Args;
-use gpbrdf_core::formats::{ExrChannels, ExrPart, write_merl, write_samples_csv, write_table_exr};
-use gpbrdf_core::{Content, LatticeLayout, Layout, detect_symmetry};
+use clap::{Args, ValueEnum};
+use gpbrdf_core::formats::{
+    ExrChannels, ExrPart, SpecularGrid, SpecularTable, write_merl, write_samples_csv, write_table_exr,
+    write_zemax,
+};
+use gpbrdf_core::{Content, LatticeLayout, Layout, SampleSet, Source, Symmetry, detect_symmetry};
 
 use super::input::open;
+use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
 pub(crate) struct Convert {
-    /// A measurement, table or model file, or the name of a built-in material.
+    /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
+    /// standard input.
     input: PathBuf,
-    /// File to write: .binary (MERL table), .exr (table) or .csv (samples).
+    #[command(flatten)]
+    reading: Reading,
+    /// File to write: .binary (MERL table), .exr (table), .csv (samples), or with --format any name.
     output: PathBuf,
+    /// What to write [default: what the name of the output says]
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    format: Option<Written>,
     /// Number of samples of a .csv from a source that can be evaluated at any direction.
     #[arg(long, value_name = "N", default_value_t = 3072)]
     samples: usize,
 }
 
+/// The formats that can be written.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Written {
+    /// A MERL table.
+    Merl,
+    /// A table as OpenEXR.
+    Exr,
+    /// Samples, with their standard deviation where it is known.
+    Csv,
+    /// The tabular BSDF of Zemax: samples on its grid as they are, other sources at incidences and azimuths in
+    /// steps of 5 degrees and 41 angles from the specular direction.
+    Zemax,
+}
+
+impl Written {
+    /// The format that the name of a file says.
+    fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        Ok(match extension.as_str() {
+            "binary" => Self::Merl,
+            "exr" => Self::Exr,
+            "csv" => Self::Csv,
+            "bsdf" => bail!(
+                "\"{}\": expected --format zemax, as several formats have names that end in .bsdf",
+                path.display()
+            ),
+            _ => bail!("\"{}\": expected a name that ends in .binary, .exr or .csv", path.display()),
+        })
+    }
+}
+
 impl Convert {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let source = open(&self.input)?;
-        let extension = self.output.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
-        match extension.as_str() {
-            "binary" | "exr" => {
+        let format = self.format.map_or_else(|| Written::of(&self.output), Ok)?;
+        let source = open(&self.input, self.reading, terminal)?;
+        match format {
+            Written::Merl => {
                 let table = terminal.stage("Tabulating", || source.table())?;
-                if extension == "binary" {
-                    write_merl(&self.output, &table)?;
-                } else {
-                    let part = ExrPart {
-                        name: "mean",
-                        description: &source.name,
-                        unit: "sr^-1",
-                        channels: ExrChannels::Rgb(table.values()),
-                    };
-                    write_table_exr(&self.output, &[part])?;
-                }
+                write_merl(&self.output, &table)?;
             }
-            "csv" => {
-                let measured;
-                let samples = if let Content::Samples(samples) = &source.content {
-                    samples
-                } else {
-                    let symmetry = detect_symmetry(source.brdf()?);
-                    let layout = Layout::Lattice(LatticeLayout::with_samples(self.samples, symmetry)?);
-                    measured = terminal.stage("Sampling", || source.measure(&layout))?;
-                    &measured
+            Written::Exr => {
+                let table = terminal.stage("Tabulating", || source.table())?;
+                let part = ExrPart {
+                    name: "mean",
+                    description: &source.name,
+                    unit: "sr^-1",
+                    channels: ExrChannels::Rgb(table.values()),
                 };
-                write_samples_csv(&self.output, samples)?;
+                write_table_exr(&self.output, &[part])?;
             }
-            _ => bail!("\"{}\": expected a name that ends in .binary, .exr or .csv", self.output.display()),
+            Written::Csv => write_samples_csv(&self.output, &*self.measure(&source, terminal)?)?,
+            Written::Zemax => {
+                let table = terminal.stage("Sampling", || specular_table(&source))?;
+                write_zemax(&self.output, &table)?;
+            }
         }
         terminal.summary(&format!("wrote {}", self.output.display()))
     }
+
+    /// The samples of the source, or samples of it on a lattice.
+    fn measure<'a>(&self, source: &'a Source, terminal: &Terminal) -> Result<Cow<'a, SampleSet>> {
+        if let Content::Samples(samples) = &source.content {
+            return Ok(Cow::Borrowed(samples));
+        }
+        let symmetry = detect_symmetry(source.brdf()?);
+        let layout = Layout::Lattice(LatticeLayout::with_samples(self.samples, symmetry)?);
+        Ok(Cow::Owned(terminal.stage("Sampling", || source.measure(&layout))?))
+    }
+}
+
+/// The source about the specular direction: its samples if it has any, else its values on a fine grid.
+fn specular_table(source: &Source) -> Result<SpecularTable> {
+    if let Content::Samples(samples) = &source.content {
+        return Ok(SpecularTable::from_samples(samples)?);
+    }
+    let brdf = source.brdf()?;
+    let grid = SpecularGrid::fine(detect_symmetry(brdf) == Symmetry::Bilateral);
+    let description = match &source.content {
+        Content::Model(_) | Content::Table(_) => source.name.clone(),
+        _ => source.description.clone(),
+    };
+    Ok(SpecularTable::measure(brdf, grid, description))
 }

@@ -11,6 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
+use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{judge, metric_lines};
 
@@ -20,6 +21,8 @@ pub(crate) struct Eval {
     prediction: PathBuf,
     /// Truth: a table or measurement file, or a built-in material.
     truth: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// Environment map of the image metrics instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
@@ -38,7 +41,9 @@ struct Evaluation {
 
 impl Eval {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let (prediction, truth) = (open(&self.prediction)?, open(&self.truth)?);
+        // The prediction can be evaluated anywhere, so it is no set of samples, which the options are for.
+        let prediction = open(&self.prediction, Reading::default(), terminal)?;
+        let truth = open(&self.truth, self.reading, terminal)?;
         let environment = environment(self.env.as_deref())?;
         if let (Content::Model(model), Content::Samples(samples)) = (&prediction.content, &truth.content) {
             return self.against_samples(terminal, &prediction, &truth, model, samples);

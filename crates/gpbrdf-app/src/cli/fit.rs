@@ -8,16 +8,20 @@ use clap::Args;
 use gpbrdf_core::base::AtomicFile;
 
 use super::input::open;
+use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{Job, ModelSpec, Report, Run, Stage};
 
 #[derive(Args, Debug)]
 pub(crate) struct Fit {
-    /// A measurement or table file, or the name of a built-in material.
+    /// A measurement or table file, the name of a built-in material, or - for measured samples from standard
+    /// input.
     input: PathBuf,
     /// Model file to write.
     #[arg(short, long, value_name = "FILE", default_value = "model.safetensors")]
     output: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     #[command(flatten)]
     model: ModelSpec,
     /// Print the report as JSON on standard output, and nothing else there.
@@ -28,7 +32,7 @@ pub(crate) struct Fit {
 impl Fit {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let mut run = Run::new(terminal.clone());
-        let source = run.stage(Stage::Load, || open(&self.input))?;
+        let source = run.stage(Stage::Load, || open(&self.input, self.reading, terminal))?;
         self.model.check(&source)?;
         // Created before the fit, so that nobody waits for a model that cannot be written.
         let mut file = AtomicFile::create(&self.output)?;

@@ -6,15 +6,18 @@ use anyhow::Result;
 use clap::Args;
 use gpbrdf_core::formats::merl_material_name;
 use gpbrdf_core::{Content, detect_symmetry};
-use serde_json::json;
+use serde_json::{Value, json};
 
-use super::input::open;
+use super::input::open_quietly;
+use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
 pub(crate) struct Info {
-    /// A file, or the name of a built-in material.
+    /// A file, the name of a built-in material, or - for measured samples from standard input.
     input: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -22,7 +25,7 @@ pub(crate) struct Info {
 
 impl Info {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let source = open(&self.input)?;
+        let source = open_quietly(&self.input, self.reading)?;
         let details = match &source.content {
             Content::Table(table) => {
                 let data = |v: &&[f32; 3]| v.iter().all(|&x| x >= 0.0);
@@ -37,7 +40,12 @@ impl Info {
             }
             Content::Samples(samples) => {
                 let largest = samples.values.as_flattened().iter().copied().fold(0.0, f64::max);
-                json!({ "samples": samples.len(), "largest_value": largest })
+                json!({
+                    "samples": samples.len(),
+                    "largest_value": largest,
+                    "standard_deviation": (!samples.sigma.is_empty()).then_some("given"),
+                    "notices": (!samples.notices.is_empty()).then_some(&samples.notices),
+                })
             }
             Content::Function { brdf, .. } => {
                 let symmetry = detect_symmetry(brdf.as_ref());
@@ -62,13 +70,17 @@ impl Info {
         }
         let mut text = format!("{}: {}\n", source.name, source.kind);
         if !source.description.is_empty() {
-            text.push_str(&format!("  {}\n", source.description));
+            text.push_str(&format!("  {}\n", source.description.replace('\n', "\n  ")));
         }
         if let Some(details) = details.as_object() {
-            for (name, value) in details.iter().filter(|(_, value)| !value.is_null()) {
+            let is_shown = |(name, value): &(&String, &Value)| !value.is_null() && name.as_str() != "notices";
+            for (name, value) in details.iter().filter(is_shown) {
                 let shown = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
                 text.push_str(&format!("  {}: {shown}\n", name.replace('_', " ")));
             }
+        }
+        for notice in source.notices() {
+            text.push_str(&format!("  note: {notice}\n"));
         }
         if !source.sha256.is_empty() {
             text.push_str(&format!("  sha256: {}\n", source.sha256));

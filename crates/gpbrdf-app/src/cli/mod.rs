@@ -9,6 +9,7 @@ mod input;
 mod materials;
 mod parse;
 mod predict;
+mod reading;
 mod render;
 mod reproduce;
 mod shader;
@@ -54,7 +55,7 @@ enum Command {
     Slice(slice::SliceCommand),
     /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
     Render(Box<render::Render>),
-    /// Write any source as .binary, .exr or .csv.
+    /// Write any source as .binary, .exr, .csv or Zemax .bsdf.
     Convert(convert::Convert),
     /// The paper's experiments, as tables and pictures.
     Reproduce(reproduce::Reproduce),

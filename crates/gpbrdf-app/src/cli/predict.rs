@@ -6,18 +6,22 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::formats::read_directions_csv;
+use gpbrdf_core::formats::{parse_directions_csv, read_directions_csv};
 use gpbrdf_core::{IntervalOf, Model};
 
+use super::input::{STANDARD_INPUT, is_standard_input, standard_input};
+use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
 pub(crate) struct Predict {
     /// Model file.
     model: PathBuf,
-    /// CSV file of directions: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d, in degrees unless the
-    /// header says otherwise.
+    /// CSV file of directions, or - for standard input: theta_i,phi_i,theta_o,phi_o or theta_h,theta_d,phi_d,
+    /// in degrees unless the header says otherwise.
     directions: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// CSV file to write instead of standard output.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -29,7 +33,12 @@ pub(crate) struct Predict {
 impl Predict {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let model = Model::load(&self.model)?;
-        let directions = read_directions_csv(&self.directions)?;
+        let options = self.reading.options();
+        let directions = if is_standard_input(&self.directions) {
+            parse_directions_csv(&standard_input()?, STANDARD_INPUT, &options)?
+        } else {
+            read_directions_csv(&self.directions, &options)?
+        };
         let of = if self.latent { IntervalOf::Latent } else { IntervalOf::Observation };
         let predictions = terminal.stage("Predicting", || model.predict(&directions.angles, of))?;
         let mut text = directions.columns.join(",");

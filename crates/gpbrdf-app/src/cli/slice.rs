@@ -10,6 +10,7 @@ use gpbrdf_core::formats::write_image_exr;
 use gpbrdf_core::{Brdf, BrdfTable};
 
 use super::input::open;
+use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
@@ -55,10 +56,13 @@ impl SliceCommand {
             size: self.size as usize,
             ..SliceOptions::default()
         };
-        let source = open(&self.input)?;
+        let source = open(&self.input, Reading::default(), terminal)?;
         let prediction = source.table()?.into_owned();
-        let truth =
-            self.difference.as_deref().map(|t| anyhow::Ok(open(t)?.table()?.into_owned())).transpose()?;
+        let truth = self
+            .difference
+            .as_deref()
+            .map(|t| anyhow::Ok(open(t, Reading::default(), terminal)?.table()?.into_owned()))
+            .transpose()?;
         if raw {
             write_exr(&self.output, &prediction, truth.as_ref(), &options)?;
         } else {

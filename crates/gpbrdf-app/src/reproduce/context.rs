@@ -9,8 +9,8 @@ use gpbrdf_core::brdf::analytic::NeuralBrdf;
 use gpbrdf_core::figure::Picture;
 use gpbrdf_core::formats::{merl_material_name, sha256_file};
 use gpbrdf_core::{
-    BrdfTable, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet, Source, Symmetry,
-    bake_mean, bake_sigma, detect_symmetry, fit,
+    BrdfTable, Content, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet, Source,
+    Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
@@ -227,7 +227,13 @@ pub(crate) fn measurements(folder: &Path, observer: &dyn Observer) -> Result<Vec
             continue;
         }
         if merl || extension.as_deref().is_some_and(|e| e == "bsdf") {
-            sources.push(Source::open(&file)?);
+            let source = Source::open(&file)?;
+            // The experiments need values everywhere.
+            if matches!(source.content, Content::Samples(_)) {
+                observer.warn(&format!("\"{}\" holds scattered samples: left out", file.display()));
+            } else {
+                sources.push(source);
+            }
         }
     }
     if sources.is_empty() {

@@ -137,7 +137,19 @@ impl Viewer {
             help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model or session:",
             access: Access::ReadMany {
                 kind: "Materials",
-                endings: &["binary", "bsdf", "csv", "exr", "safetensors", "brdf", "json"],
+                endings: &[
+                    "binary",
+                    "bsdf",
+                    "csv",
+                    "txt",
+                    "dat",
+                    "tsv",
+                    "astm",
+                    "exr",
+                    "safetensors",
+                    "brdf",
+                    "json",
+                ],
             },
             answer: outbox.map(Event::Open),
         };

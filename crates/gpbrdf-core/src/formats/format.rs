@@ -1,13 +1,18 @@
 //! File formats, and how the format of a file is recognised.
 
+use std::borrow::Cow;
 use std::fmt::{self, Write as _};
 use std::io::Read;
 use std::path::Path;
 
 use crate::base::error::{Error, Result};
 use crate::formats::FORMATS;
+use crate::formats::measured::Input;
+use crate::formats::measured::text::comment::comment;
+use crate::formats::measured::text::encoding::decode_head;
 use crate::formats::read::open;
 use crate::formats::source::Content;
+use crate::sample::SampleSet;
 
 /// A file format that can be read. Each format is a constant beside its reader and is listed in [`FORMATS`].
 #[derive(Clone, Copy)]
@@ -20,7 +25,16 @@ pub struct Format {
     /// is whole; reading it then says what is wrong.
     pub(crate) recognises: fn(&Head<'_>) -> bool,
     /// Reads a file of the format.
-    pub(crate) read: fn(&Path) -> Result<Content>,
+    pub(crate) read: Reader,
+}
+
+/// How the files of a format are read.
+#[derive(Clone, Copy)]
+pub(crate) enum Reader {
+    /// From a file.
+    File(fn(&Path) -> Result<Content>),
+    /// Measurements as text, from the whole content of a file. How they are read can be chosen.
+    Samples(fn(Input<'_>) -> Result<SampleSet>),
 }
 
 impl PartialEq for Format {
@@ -44,7 +58,7 @@ impl fmt::Display for Format {
 }
 
 /// The start of a file, as it is passed to [`Format::recognises`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Head<'a> {
     /// The first bytes.
     pub(crate) bytes: &'a [u8],
@@ -53,17 +67,18 @@ pub(crate) struct Head<'a> {
     /// Whether the file is called `*.binary`.
     pub(crate) named_binary: bool,
     /// The bytes as text without a byte order mark, if they are text.
-    pub(crate) text: Option<&'a str>,
-    /// The first line of the text that is not a comment.
-    pub(crate) line: Option<&'a str>,
+    pub(crate) text: Option<Cow<'a, str>>,
 }
 
 impl<'a> Head<'a> {
     fn new(bytes: &'a [u8], length: u64, named_binary: bool) -> Self {
-        let text = as_text(bytes);
-        let content = |line: &&str| !line.is_empty() && !line.starts_with('#');
-        let line = text.and_then(|text| text.lines().map(str::trim).find(content));
-        Self { bytes, length, named_binary, text, line }
+        Self { bytes, length, named_binary, text: decode_head(bytes) }
+    }
+
+    /// The first line of the text that is not a comment.
+    pub(crate) fn line(&self) -> Option<&str> {
+        let text = self.text.as_deref()?;
+        text.split(['\n', '\r']).map(str::trim).find(|line| !line.is_empty() && comment(line).is_none())
     }
 }
 
@@ -103,9 +118,15 @@ pub fn recognise(path: impl AsRef<Path>) -> Result<&'static Format> {
     let (file, length) = open(path)?;
     let mut head = Vec::new();
     file.take(HEAD_BYTES).read_to_end(&mut head).map_err(|source| Error::read(path, source))?;
-    let named_binary = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("binary"));
     let length = length.unwrap_or(head.len() as u64);
-    recognise_head(&Head::new(&head, length, named_binary)).map_err(|found| Error::UnknownFormat {
+    recognise_bytes(&head, length, path)
+}
+
+/// Like [`recognise`], from the first bytes of the content that `path` stands for, or more.
+pub(crate) fn recognise_bytes(bytes: &[u8], length: u64, path: &Path) -> Result<&'static Format> {
+    let head = &bytes[..bytes.len().min(usize::try_from(HEAD_BYTES).unwrap_or(usize::MAX))];
+    let named_binary = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("binary"));
+    recognise_head(&Head::new(head, length, named_binary)).map_err(|found| Error::UnknownFormat {
         path: path.to_owned(),
         expected: format!("one of {}", FORMATS.map(|format| format.file).join(", ")),
         found,
@@ -123,7 +144,7 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
     if let Some(found) = FORMATS.into_iter().find(|format| (format.recognises)(head)) {
         return Ok(found);
     }
-    Err(match (head.text, head.line) {
+    Err(match (head.text.as_deref(), head.line()) {
         (Some(text), _) if text.trim().is_empty() => "an empty text".to_owned(),
         (Some(_), None) => "nothing but comments".to_owned(),
         (Some(_), Some(line)) => {
@@ -141,25 +162,12 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
     })
 }
 
-/// The start of a file as text without its byte order mark, if it is text. A character that is cut off at the
-/// end is left out.
-fn as_text(head: &[u8]) -> Option<&str> {
-    let text = match std::str::from_utf8(head) {
-        Ok(text) => text,
-        Err(error) if error.error_len().is_none() => {
-            std::str::from_utf8(&head[..error.valid_up_to()]).ok()?
-        }
-        Err(_) => return None,
-    };
-    let text = text.strip_prefix('\u{FEFF}').unwrap_or(text);
-    let is_text = text.chars().all(|c| !c.is_control() || c.is_whitespace());
-    is_text.then_some(text)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::{cornell, csv, exr, merl, model, rgl};
+    use crate::formats::measured::text::samples;
+    use crate::formats::measured::{alta, astm, cornell, zemax};
+    use crate::formats::{exr, merl, model, rgl};
 
     fn head(bytes: &[u8]) -> Result<&'static Format, String> {
         recognise_head(&Head::new(bytes, bytes.len() as u64, false))
@@ -179,13 +187,15 @@ mod tests {
         assert!(head(&other).is_err());
         other.resize(12 + 24 * 24, 0);
         assert_eq!(head(&other), Ok(&merl::FORMAT));
-        assert_eq!(
-            head(b"\xEF\xBB\xBF# note\n\ntheta_i,phi_i,theta_o,phi_o,r,g,b\n"),
-            Ok(&csv::samples::FORMAT)
-        );
-        assert_eq!(head(b"f, Theta_D_rad,phi_d_rad\n"), Ok(&csv::samples::FORMAT));
+        assert_eq!(head(b"\xEF\xBB\xBF# note\n\ntheta_i,phi_i,theta_o,phi_o,r,g,b\n"), Ok(&samples::FORMAT));
+        assert_eq!(head(b"f, Theta_D_rad,phi_d_rad\n"), Ok(&samples::FORMAT));
         assert_eq!(head(b"# num wls\r\n31\r\n"), Ok(&cornell::FORMAT));
         assert_eq!(head(b"1 2 3"), Ok(&cornell::FORMAT));
+        assert_eq!(head(b"# x\n# theta_i phi_i theta_o phi_o f\n1 2 3 4 5\n"), Ok(&samples::FORMAT));
+        assert_eq!(head(b"\xFF\xFEt\0h\0e\0t\0a\0_\0i\0;\0f\0\n\0"), Ok(&samples::FORMAT));
+        assert_eq!(head(b"#SAMPLE \"x\"\n#PARAM_IN CARTESIAN\n1 2 3 4 5 6 7\n"), Ok(&alta::FORMAT));
+        assert_eq!(head(b"# x\nSource Measured\nScatterRadial 2\n"), Ok(&zemax::FORMAT));
+        assert_eq!(head(b"LAB x\nVARS theta_i,phi_i,theta_s,phi_s,R,G,B\n"), Ok(&astm::FORMAT));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Model files. [`Model`] reads and writes their content.
 
-use crate::formats::format::{Format, Head};
+use crate::formats::format::{Format, Head, Reader};
 use crate::formats::source::Content;
 use crate::model::Model;
 
@@ -9,7 +9,7 @@ pub(crate) const FORMAT: Format = Format {
     name: "gpbrdf model",
     file: "gpbrdf model",
     recognises,
-    read: |path| Ok(Content::Model(Box::new(Model::load(path)?))),
+    read: Reader::File(|path| Ok(Content::Model(Box::new(Model::load(path)?)))),
 };
 
 /// Whether the file starts with a length of eight bytes that fits into the file, followed by JSON.

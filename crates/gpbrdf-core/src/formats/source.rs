@@ -7,13 +7,19 @@ use crate::base::error::{Error, Result};
 use crate::brdf::materials::material;
 use crate::brdf::table::BrdfTable;
 use crate::brdf::{Brdf, Reciprocal};
-use crate::formats::{merl_material_name, recognise, sha256_file};
+use crate::formats::format::{Reader, recognise_bytes};
+use crate::formats::measured::{Input, ReadOptions};
+use crate::formats::read::{open, read_bytes};
+use crate::formats::{merl_material_name, recognise, sha256_file, sha256_hex};
 use crate::model::Model;
 use crate::model::bake::bake_mean;
 use crate::sample::{Layout, Provenance, SampleSet};
 
 /// Analytic models are evaluated at a cosine of at least this, so that cells at the horizon are filled.
 const ANALYTIC_MIN_COSINE: f64 = 1e-3;
+
+/// The largest file of measurements that is read.
+const LIMIT_BYTES: u64 = 1 << 30;
 
 /// What a source holds.
 pub enum Content {
@@ -68,10 +74,55 @@ impl Source {
     /// [`Error::Io`] or [`Error::Format`] for a file that cannot be read or is damaged;
     /// [`Error::UnknownFormat`] for one that has no known format.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// Like [`Source::open`]; `options` say how to read measurements that are text. A file that is no regular
+    /// one, for example a pipe, is read as by [`Source::parse`].
+    ///
+    /// # Errors
+    /// Those of [`Source::open`], and [`Error::Unsuitable`] if there are options for a file that holds no such
+    /// measurements.
+    pub fn open_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
         let path = path.as_ref();
+        let (_, length) = open(path)?;
+        if length.is_none() {
+            return Self::parse(&read_bytes(path, "text", LIMIT_BYTES)?, path, options);
+        }
         let format = recognise(path)?;
-        let content = (format.read)(path)?;
-        let sha256 = sha256_file(path)?;
+        match format.read {
+            Reader::File(read) => {
+                no_options(path, options)?;
+                Ok(Self::read_from(path, format.name, read(path)?, sha256_file(path)?))
+            }
+            Reader::Samples(_) => Self::parse(&read_bytes(path, format.name, LIMIT_BYTES)?, path, options),
+        }
+    }
+
+    /// Reads the content of a file of measurements that are text; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// Those of [`Source::open_with`]; [`Error::UnknownFormat`] also for tables and models, which are read from
+    /// files only.
+    pub fn parse(bytes: &[u8], name: impl AsRef<Path>, options: &ReadOptions) -> Result<Self> {
+        let name = name.as_ref();
+        let format = recognise_bytes(bytes, bytes.len() as u64, name)?;
+        match format.read {
+            Reader::File(_) => Err(Error::UnknownFormat {
+                path: name.to_owned(),
+                expected: "measurements as text, or the name of a regular file".to_owned(),
+                found: format.file.to_owned(),
+            }),
+            Reader::Samples(read) => {
+                let samples = read(Input { format: format.name, path: name, bytes, options })?;
+                let content = Content::Samples(Box::new(samples));
+                Ok(Self::read_from(name, format.name, content, sha256_hex(bytes)))
+            }
+        }
+    }
+
+    /// A source that was read.
+    fn read_from(path: &Path, kind: &str, content: Content, sha256: String) -> Self {
         let stem = || path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         let mut name = merl_material_name(&sha256).map_or_else(stem, str::to_owned);
         let description = match &content {
@@ -83,13 +134,22 @@ impl Source {
                 format!("model of {}", model.provenance.source)
             }
         };
-        let kind = format.name.to_owned();
-        let mut source = Self { name, description, kind, path: Some(path.to_owned()), sha256, content };
+        let mut source =
+            Self { name, description, kind: kind.to_owned(), path: Some(path.to_owned()), sha256, content };
         let origin = source.provenance();
         if let Content::Samples(samples) = &mut source.content {
             samples.origin = origin;
         }
-        Ok(source)
+        source
+    }
+
+    /// What the user should know about how the source was read.
+    #[must_use]
+    pub fn notices(&self) -> &[String] {
+        match &self.content {
+            Content::Samples(samples) => &samples.notices,
+            _ => &[],
+        }
     }
 
     /// The built-in material called `name`.
@@ -189,6 +249,18 @@ impl Source {
             .as_ref()
             .map_or_else(|| format!("built-in {}", self.name), |path| path.display().to_string())
     }
+}
+
+/// Refuses options for a file that says itself how it is to be read.
+fn no_options(path: &Path, options: &ReadOptions) -> Result<()> {
+    if *options == ReadOptions::default() {
+        return Ok(());
+    }
+    Err(Error::Unsuitable {
+        what: path.display().to_string(),
+        expected: "measurements as text, for options about values and angles",
+        found: "a format that leaves no choice",
+    })
 }
 
 #[cfg(test)]

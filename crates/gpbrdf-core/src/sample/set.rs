@@ -17,25 +17,34 @@ pub struct Sample {
     pub wi: Vector3<f64>,
     /// Unit direction to the viewer, above the horizon.
     pub wo: Vector3<f64>,
-    /// `f(wi, wo)` in sr^-1, without the cosine.
+    /// `f(wi, wo)` in sr^-1, without the cosine. Noise can make the value of a dark sample slightly negative.
     pub value: Rgb,
 }
 
 /// Measured values at known directions, to which a model is fitted. Samples keep the order of their source.
+///
+/// Lists that hold something for each sample are as long as [`SampleSet::angles`] or empty.
+/// [`SampleSet::subset`] keeps them aligned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SampleSet {
     /// What the source says about itself; empty if it says nothing.
     pub description: String,
     /// Half-difference angles of each sample.
     pub angles: Vec<HalfDiff>,
-    /// `f` in sr^-1 at each of the angles.
+    /// `f` in sr^-1 at each of the angles. Noise can make dark values slightly negative.
     pub values: Vec<Rgb>,
+    /// The standard deviation of each value, in sr^-1. Empty if the source does not give it.
+    pub sigma: Vec<Rgb>,
+    /// The line of the source's file that holds each sample, counted from 1. Empty if there is none.
+    pub lines: Vec<u64>,
     /// `[wi, wo]` of each sample as measured, including its rotation about the normal. Empty if only the
     /// angles are known.
     pub directions: Vec<[Vector3<f64>; 2]>,
     /// Where the samples come from. If [`Provenance::lattice`] is given, the samples are in the order of its
     /// nodes.
     pub origin: Provenance,
+    /// What the user should know about how the source was read, in whole sentences without a full stop.
+    pub notices: Vec<String>,
 }
 
 impl SampleSet {
@@ -84,6 +93,39 @@ impl SampleSet {
         self.origin.lattice.as_ref()
     }
 
+    /// The samples with these indices, in this order, with everything that is known about each. They lie on no
+    /// lattice.
+    ///
+    /// # Panics
+    /// If an index is not below [`SampleSet::len`].
+    #[must_use]
+    pub fn subset(&self, indices: &[usize]) -> Self {
+        fn take<T: Copy>(of: &[T], indices: &[usize]) -> Vec<T> {
+            if of.is_empty() { Vec::new() } else { indices.iter().map(|&i| of[i]).collect() }
+        }
+        let layout = match self.origin.layout {
+            SampleLayout::Lattice => SampleLayout::Samples,
+            other => other,
+        };
+        Self {
+            description: self.description.clone(),
+            angles: take(&self.angles, indices),
+            values: take(&self.values, indices),
+            sigma: take(&self.sigma, indices),
+            lines: take(&self.lines, indices),
+            directions: take(&self.directions, indices),
+            origin: Provenance { layout, lattice: None, ..self.origin.clone() },
+            notices: self.notices.clone(),
+        }
+    }
+
+    /// Adds a sample of which no more is known than its directions and its value.
+    pub(crate) fn push(&mut self, Sample { wi, wo, value }: Sample) {
+        self.angles.push(HalfDiff::from_directions(&wi, &wo));
+        self.directions.push([wi, wo]);
+        self.values.push(value);
+    }
+
     /// The samples one by one. If the measured directions are not known, the half vector is above the x axis.
     pub fn iter(&self) -> impl Iterator<Item = Sample> + '_ {
         self.angles.iter().zip(&self.values).enumerate().map(|(i, (angles, &value))| {
@@ -99,11 +141,31 @@ const BLOCK: usize = 256;
 impl FromIterator<Sample> for SampleSet {
     fn from_iter<I: IntoIterator<Item = Sample>>(samples: I) -> Self {
         let mut set = Self::default();
-        for Sample { wi, wo, value } in samples {
-            set.angles.push(HalfDiff::from_directions(&wi, &wo));
-            set.directions.push([wi, wo]);
-            set.values.push(value);
-        }
+        samples.into_iter().for_each(|sample| set.push(sample));
         set
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::angles::direction;
+
+    #[test]
+    fn subsets_stay_aligned() {
+        let sample = |i: u32| Sample {
+            wi: direction(0.1 * f64::from(i), 0.0),
+            wo: direction(0.2, 1.0),
+            value: [f64::from(i); 3],
+        };
+        let mut set: SampleSet = (0..5).map(sample).collect();
+        set.sigma = set.values.clone();
+        set.lines = (10..15).collect();
+        let found = set.subset(&[3, 1]);
+        assert_eq!(found.values, [[3.0; 3], [1.0; 3]]);
+        assert_eq!((found.sigma.clone(), found.lines.clone()), (found.values.clone(), vec![13, 11]));
+        assert_eq!(found.iter().next().unwrap(), sample(3));
+        set.lines.clear();
+        assert!(set.subset(&[0]).lines.is_empty());
     }
 }

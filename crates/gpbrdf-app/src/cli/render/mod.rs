@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use super::input::{environment, open};
 use super::parse::{Exposure, parse_exposure, parse_pair, parse_positive, parse_size, parse_vector};
+use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{Backend, Baked, Baking, Job, ModelSpec, Observer, Run, Stage};
 use choices::{BackgroundName, LightName, SamplingName, ShowName, ToneName};
@@ -29,9 +30,12 @@ const CHUNK: u32 = 16;
 
 #[derive(Args, Debug)]
 pub(crate) struct Render {
-    /// A measurement, table or model file, or the name of a built-in material.
+    /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
+    /// standard input.
     #[arg(default_value = "cherry-235")]
     input: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// Picture to write: .png (as shown) or .exr (linear). May be repeated.
     #[arg(short, long, value_name = "FILE", default_value = "render.png")]
     output: Vec<PathBuf>,
@@ -130,7 +134,7 @@ impl Render {
         let context = Context::open(AdapterChoice::Any)?;
         terminal.detail(&format!("adapter: {}", context.describe()));
         let mut renderer = self.renderer(&context)?;
-        let source = run.stage(Stage::Load, || open(&self.input))?;
+        let source = run.stage(Stage::Load, || open(&self.input, self.reading, terminal))?;
         let materials = self.materials(&source, &mut run)?;
         set_materials(&mut renderer, &context, &source, &materials)?;
         run.stage(Stage::Render, || self.accumulate(&mut renderer))?;

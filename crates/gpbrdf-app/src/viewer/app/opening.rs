@@ -52,6 +52,9 @@ impl Viewer {
 
     /// Opens a material that has been read.
     pub(super) fn open(&mut self, opened: Opened) {
+        for notice in opened.source.notices() {
+            self.context.messages.note(format!("{}: {notice}", opened.source.name));
+        }
         let document = self.context.documents.add(*opened.source);
         if let Some(saved) = opened.restore {
             saved.restore(document);

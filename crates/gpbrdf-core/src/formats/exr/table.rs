@@ -9,7 +9,7 @@
 //! against 134 ms with RLE (no smaller) and 1040 ms with ZIP16 (18.1 MB): the low bits of measured f32 values
 //! cannot be compressed.
 
-use crate::formats::format::Format;
+use crate::formats::format::{Format, Reader};
 use crate::formats::source::Content;
 use std::collections::HashMap;
 use std::io::{self, BufReader, Read, Seek, Write};
@@ -36,7 +36,7 @@ pub(crate) const FORMAT: Format = Format {
     name: "OpenEXR table",
     file: "table EXR",
     recognises: |head| head.bytes.starts_with(super::MAGIC),
-    read: |path| Ok(Content::Table(read_table_exr(path)?)),
+    read: Reader::File(|path| Ok(Content::Table(read_table_exr(path)?))),
 };
 
 const WIDTH: usize = N_PHI_D;

@@ -9,7 +9,7 @@ mod names;
 
 pub use names::merl_material_name;
 
-use crate::formats::format::Format;
+use crate::formats::format::{Format, Reader};
 use crate::formats::source::Content;
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -25,7 +25,7 @@ pub(crate) const FORMAT: Format = Format {
     name: "MERL table",
     file: "MERL .binary",
     recognises,
-    read: |path| Ok(Content::Table(read_merl(path)?)),
+    read: Reader::File(|path| Ok(Content::Table(read_merl(path)?))),
 };
 
 /// Size of a MERL file in bytes: 34,992,012.

@@ -15,7 +15,7 @@
 
 mod tensor_file;
 
-use crate::formats::format::Format;
+use crate::formats::format::{Format, Reader};
 use crate::formats::source::Content;
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::path::Path;
@@ -48,7 +48,7 @@ pub(crate) const FORMAT: Format = Format {
     name: "RGL measurement",
     file: "RGL .bsdf",
     recognises: |head| head.bytes.starts_with(MAGIC),
-    read: read_reciprocal,
+    read: Reader::File(read_reciprocal),
 };
 
 /// Limit on the size of a file; every file of the database is smaller, spectral and anisotropic ones

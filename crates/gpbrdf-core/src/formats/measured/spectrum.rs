@@ -68,6 +68,13 @@ const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
     [0.055_643_4, -0.204_025_9, 1.057_225_2],
 ];
 
+/// The inverse of [`SRGB_FROM_XYZ`].
+const XYZ_FROM_SRGB: [[f64; 3]; 3] = [
+    [0.412_456_4, 0.357_576_1, 0.180_437_5],
+    [0.212_672_9, 0.715_152_2, 0.072_175_0],
+    [0.019_333_9, 0.119_192_0, 0.950_304_1],
+];
+
 /// The linear map from spectra at given wavelengths to linear sRGB.
 #[derive(Clone, Debug)]
 pub(crate) struct SpectrumToRgb {
@@ -113,6 +120,49 @@ impl SpectrumToRgb {
         }
         sum.map(|channel: f64| channel.max(0.0))
     }
+
+    /// The standard deviation of each channel for independent ones of the wavelengths.
+    pub(crate) fn sigma(&self, sigma: impl IntoIterator<Item = f64>) -> Rgb {
+        let mut sum = [0.0; 3];
+        for (sigma, weights) in sigma.into_iter().zip(&self.weights) {
+            for c in 0..3 {
+                sum[c] += (sigma * weights[c]).powi(2);
+            }
+        }
+        sum.map(f64::sqrt)
+    }
+}
+
+/// What is worth knowing about a conversion from `wavelengths`, nm: where it relies on values that were not
+/// measured.
+pub(crate) fn sparse(wavelengths: &[f64]) -> Option<String> {
+    let (first, last) = (wavelengths.first()?, wavelengths.last()?);
+    let gap = wavelengths.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    (gap > MOST_GAP_NM || *first > LEAST_FIRST_NM || *last < MOST_LAST_NM).then(|| {
+        format!(
+            "colours are made of {} wavelengths from {first} to {last} nm, between which values are linear and \
+             beyond which they are constant",
+            wavelengths.len()
+        )
+    })
+}
+
+/// Spectra are said to be sparse if neighbours are further apart, nm.
+const MOST_GAP_NM: f64 = 30.0;
+/// Or if they start later, nm: below, the observer sees less than 1 %.
+const LEAST_FIRST_NM: f64 = 430.0;
+/// Or if they end earlier, nm.
+const MOST_LAST_NM: f64 = 650.0;
+
+/// Linear sRGB of CIE XYZ of which a perfect diffuser has the luminance `Y = 1` and the white of D65;
+/// out-of-gamut (negative) channels are set to 0.
+pub(crate) fn srgb_from_xyz([x, y, z]: [f64; 3]) -> Rgb {
+    SRGB_FROM_XYZ.map(|row| (row[0] * x + row[1] * y + row[2] * z).max(0.0))
+}
+
+/// The inverse of [`srgb_from_xyz`] within the gamut.
+pub(crate) fn xyz_from_srgb([r, g, b]: Rgb) -> [f64; 3] {
+    XYZ_FROM_SRGB.map(|row| row[0] * r + row[1] * g + row[2] * b)
 }
 
 #[cfg(test)]
@@ -154,6 +204,27 @@ mod tests {
                 assert!((channel - 1.0).abs() < 1e-6, "{channel}");
             }
         }
+    }
+
+    #[test]
+    fn matrices_are_inverse_to_each_other() {
+        let colour = [0.3, 0.7, 0.1];
+        let again = srgb_from_xyz(xyz_from_srgb(colour));
+        (0..3).for_each(|c| assert!((again[c] - colour[c]).abs() < 1e-6, "{again:?}"));
+        assert_eq!(srgb_from_xyz([0.0, 1.0, 0.0])[0], 0.0);
+        let white = srgb_from_xyz(WHITE);
+        white.iter().for_each(|x| assert!((x - 1.0).abs() < 1e-4, "{white:?}"));
+    }
+
+    #[test]
+    fn sparse_spectra_are_said() {
+        let grid: Vec<f64> = (0..31).map(|k| 400.0 + 10.0 * f64::from(k)).collect();
+        assert_eq!(sparse(&grid), None);
+        assert!(sparse(&[450.0, 550.0, 650.0]).unwrap().contains("3 wavelengths from 450 to 650 nm"));
+        let map = SpectrumToRgb::new(&grid).unwrap();
+        let one = map.sigma(grid.iter().map(|&w| f64::from(w == 550.0)));
+        let as_value = map.rgb(grid.iter().map(|&w| f64::from(w == 550.0)));
+        assert!((one[1] - as_value[1]).abs() < 1e-12);
     }
 
     #[test]

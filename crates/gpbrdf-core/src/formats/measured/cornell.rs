@@ -4,29 +4,31 @@
 //! `theta_i phi_i theta_s phi_s` in radians and `f` in sr^-1 at each wavelength. `#` starts a comment.
 //! Source: the Light Measurement Laboratory of Cornell University's Program of Computer Graphics.
 
-mod spectrum;
-
-use crate::formats::format::Format;
-use crate::formats::source::Content;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::brdf::angles::direction;
-use crate::formats::cornell::spectrum::SpectrumToRgb;
+use crate::formats::format::{Format, Reader};
+use crate::formats::measured::collector::{Collector, Row, Sigma};
+use crate::formats::measured::input::Input;
+use crate::formats::measured::options::{ReadOptions, ValueKind};
+use crate::formats::measured::spectrum::{SpectrumToRgb, sparse};
 use crate::formats::read::read_bytes;
-use crate::sample::{Sample, SampleSet};
+use crate::sample::SampleSet;
 
 /// Scattered measurements with spectra, as in the Cornell database.
 pub(crate) const FORMAT: Format = Format {
     name: "Cornell measurement",
     file: "Cornell .brdf",
     recognises: |head| {
-        head.line.is_some_and(|line| line.split_whitespace().all(|token| token.parse::<f64>().is_ok()))
+        head.line().is_some_and(|line| line.split_whitespace().all(|token| token.parse::<f64>().is_ok()))
     },
-    read: |path| Ok(Content::Samples(Box::new(read_cornell(path)?))),
+    read: Reader::Samples(parse),
 };
 
+/// The name in messages.
+const NAME: &str = "Cornell";
 /// The largest file that is read.
 const LIMIT_BYTES: u64 = 1 << 28;
 /// Limit on the number of wavelengths, which no instrument reaches.
@@ -36,31 +38,28 @@ const MAX_WAVELENGTHS: usize = 10_000;
 /// under D65; out-of-gamut channels are set to 0.
 ///
 /// # Errors
-/// [`Error::Io`] when the file cannot be read; [`Error::Format`], which names the line, when it is not of
-/// this format, a number is not finite or a direction is below the horizon.
+/// [`Error::Io`](crate::Error::Io) when the file cannot be read; [`Error::Format`](crate::Error::Format), which
+/// names the line, when it is not of this format, a number is not finite or a direction is below the horizon.
 pub fn read_cornell(path: impl AsRef<Path>) -> Result<SampleSet> {
     let path = path.as_ref();
-    parse(&read_bytes(path, "Cornell", LIMIT_BYTES)?, path)
+    let bytes = read_bytes(path, NAME, LIMIT_BYTES)?;
+    parse(Input { format: NAME, path, bytes: &bytes, options: &ReadOptions::default() })
 }
 
-fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
-    let wrong = |expected: String, found: String| Error::Format {
-        format: "Cornell",
-        path: path.to_owned(),
-        expected,
-        found,
-    };
-    if bytes.is_empty() {
+fn parse(input: Input<'_>) -> Result<SampleSet> {
+    let input = Input { format: NAME, ..input };
+    let wrong = |expected: String, found: String| input.wrong(expected, found);
+    if input.bytes.is_empty() {
         return Err(wrong("the number of wavelengths".to_owned(), "an empty file".to_owned()));
     }
-    let text = String::from_utf8_lossy(bytes);
+    let text = input.text()?;
     // The lines that have content, numbered from 1.
     let mut lines = text
         .lines()
         .zip(1..)
-        .map(|(line, number): (&str, usize)| (line.split('#').next().unwrap_or("").trim(), number))
+        .map(|(line, number): (&str, u64)| (line.split('#').next().unwrap_or("").trim(), number))
         .filter(|(line, _)| !line.is_empty());
-    let number = |token: &str, line: usize| {
+    let number = |token: &str, line: u64| {
         token.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
             let shown: String = token.chars().take(40).collect();
             wrong(format!("a finite number on line {line}"), format!("\"{shown}\""))
@@ -94,7 +93,11 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
         ));
     };
 
-    let mut samples = Vec::new();
+    let mut samples = Collector::new(input, ValueKind::Brdf);
+    if let Some(notice) = sparse(&wavelengths) {
+        samples.notice(notice);
+    }
+    let mut rows = 0;
     let mut row = Vec::with_capacity(4 + count);
     for (line, at) in lines {
         row.clear();
@@ -110,9 +113,9 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
             ));
         };
         for (name, theta) in [("theta_i", *theta_i), ("theta_s", *theta_s)] {
-            if !(0.0..FRAC_PI_2).contains(&theta) {
+            if !(0.0..=FRAC_PI_2 + 1e-5).contains(&theta) {
                 return Err(wrong(
-                    format!("{name} from 0 to under pi/2 (above the horizon) on line {at}"),
+                    format!("{name} from 0 to pi/2 (above the horizon) on line {at}"),
                     theta.to_string(),
                 ));
             }
@@ -123,13 +126,17 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
                 return Err(wrong(format!("{name} from -2 pi to 2 pi on line {at}"), phi.to_string()));
             }
         }
-        samples.push(Sample {
+        rows += 1;
+        let row = Row {
+            line: at,
             wi: direction(*theta_i, *phi_i),
             wo: direction(*theta_s, *phi_s),
             value: to_rgb.rgb(spectrum.iter().copied()),
-        });
+            sigma: Sigma::Unknown,
+        };
+        samples.push(row, spectrum)?;
     }
-    if samples.is_empty() {
+    if rows == 0 {
         return Err(wrong("at least one sample".to_owned(), "wavelengths only".to_owned()));
     }
     let comments: Vec<_> = text
@@ -138,7 +145,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
         .map(str::trim)
         .filter(|comment| !comment.is_empty() && !comment.starts_with("num wls"))
         .collect();
-    Ok(SampleSet { description: comments.join(", "), ..samples.into_iter().collect() })
+    samples.finish(comments.join(", "))
 }
 
 #[cfg(test)]
@@ -150,6 +157,10 @@ mod tests {
     const SMALL: &str = "# Grey\n\n# num wls\n3\n# wls\n400 550\n700 # nm\n# rows\n\
         0.5 0.0 0.25 -2.5 0.2 0.2 0.2\n0.1 0 0.2 1 0.3 0.3 0.3\n";
 
+    fn parse(bytes: &[u8], path: &Path) -> Result<SampleSet> {
+        super::parse(Input { format: NAME, path, bytes, options: &ReadOptions::default() })
+    }
+
     fn error(text: &str) -> String {
         let message = parse(text.as_bytes(), Path::new("x.brdf")).unwrap_err().to_string();
         message.strip_prefix("Cornell file \"x.brdf\": expected ").unwrap().to_owned()
@@ -160,6 +171,8 @@ mod tests {
         let found = parse(SMALL.as_bytes(), Path::new("x")).unwrap();
         assert_eq!(found.len(), 2);
         assert_eq!(found.description, "Grey");
+        assert_eq!(found.lines, [9, 10]);
+        assert!(found.notices[0].contains("3 wavelengths from 400 to 700 nm"), "{:?}", found.notices);
         assert!(found.values[0].iter().all(|value| (value - 0.2).abs() < 1e-6));
         assert!((found.directions[0][1] - direction(0.25, -2.5)).norm() < 1e-15);
     }
@@ -180,10 +193,7 @@ mod tests {
         let row = |text: &str| error(&format!("2\n400 500\n{text}\n"));
         assert_eq!(row("0 0 0 0 1"), "4 angles and 2 values on line 3, found 5 numbers");
         assert_eq!(row("0 0 0 0 1 nan"), "a finite number on line 3, found \"nan\"");
-        assert_eq!(
-            row("0 0 1.6 0 1 1"),
-            "theta_s from 0 to under pi/2 (above the horizon) on line 3, found 1.6"
-        );
+        assert_eq!(row("0 0 1.6 0 1 1"), "theta_s from 0 to pi/2 (above the horizon) on line 3, found 1.6");
         assert_eq!(row("0 90 0 0 1 1"), "phi_i from -2 pi to 2 pi on line 3, found 90");
     }
 
