@@ -72,7 +72,7 @@ pub use brdf::{Brdf, BrdfTable, HalfDiff, Rgb, SigmaTable};
 #[cfg(feature = "formats")]
 pub use formats::{Content, Source};
 #[cfg(feature = "fit")]
-pub use gp::{FitReport, Noise, Observer};
+pub use gp::{FitReport, Noise, Observer, Outliers};
 pub use gp::{Hyper, Solver};
 pub use judge::{Environment, Metrics};
 pub use kernel::Shape;

@@ -46,6 +46,21 @@ pub(crate) struct Problem<'a> {
     pub(crate) watch: &'a Watch<'a>,
 }
 
+impl Problem<'_> {
+    /// Refuses samples with standard deviations of their own, for solvers whose samples share one noise.
+    pub(crate) fn refuse_known_noise(&self) -> Result<()> {
+        if self.known_noise.is_empty() {
+            return Ok(());
+        }
+        let found = "samples with standard deviations of their own";
+        Err(Error::argument(
+            "samples of this solver",
+            "one noise for all of them (or the scattered solver)",
+            found,
+        ))
+    }
+}
+
 /// What is done about samples that contradict all samples around them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

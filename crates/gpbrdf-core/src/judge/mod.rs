@@ -3,6 +3,8 @@
 mod environment;
 mod image;
 pub(crate) mod image_metrics;
+#[cfg(feature = "fit")]
+mod left_out;
 mod metrics;
 mod sample_metrics;
 pub(crate) mod sphere;
@@ -11,6 +13,8 @@ mod ssim;
 pub use environment::{EnvDirection, Environment};
 pub use image::Image;
 pub use image_metrics::{ImageMetrics, PixelDifference, exposed_difference, exposure_of, psnr, ssim};
+#[cfg(feature = "fit")]
+pub use left_out::{LeftOut, Outlier};
 pub use metrics::{CellMetrics, Interval, Metrics};
 pub use sample_metrics::SampleMetrics;
 pub use sphere::{

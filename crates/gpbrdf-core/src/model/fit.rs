@@ -1,6 +1,7 @@
 //! Fitting a model to samples, and conditioning one at known hyper-parameters.
 
 use crate::base::error::{Error, Result};
+use crate::brdf::Rgb;
 use crate::gp::problem::{Problem, Watch};
 use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Outliers, Solver};
 use crate::kernel::Shape;
@@ -68,6 +69,7 @@ impl FitOptions {
         &'a self,
         samples: &'a SampleSet,
         targets: Vec<Vec<f64>>,
+        known_noise: &'a [f64],
         watch: &'a Watch<'a>,
     ) -> Problem<'a> {
         Problem {
@@ -77,7 +79,7 @@ impl FitOptions {
             space: self.space,
             kernel: &self.kernel,
             noise: self.noise,
-            known_noise: &[],
+            known_noise,
             priors: self.hyper_priors,
             outliers: self.outliers,
             optimize: &self.optimize,
@@ -116,10 +118,13 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
         return Err(Error::argument("kernel", "at least one shape", "none"));
     }
     options.kernel.iter().flatten().try_for_each(|shape| shape.validate())?;
-    let groups: Vec<Vec<Vec<f64>>> =
-        if options.per_channel { targets.into_iter().map(|t| vec![t]).collect() } else { vec![targets] };
+    let channels: &[std::ops::Range<usize>] = if options.per_channel { &[0..1, 1..2, 2..3] } else { &[0..3] };
     let watch = Watch::new(&options.observer);
-    let fitted = groups.into_iter().map(|t| options.solver.fit(&options.problem(samples, t, &watch)));
+    let fitted = channels.iter().map(|channels| {
+        let noise = known_noise(samples, options.transform, channels.clone());
+        let targets = targets[channels.clone()].to_vec();
+        options.solver.fit(&options.problem(samples, targets, &noise, &watch))
+    });
     let (posteriors, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     let origin = samples.origin.clone();
     let model = Model::new(origin, options.transform, options.mean, offsets, posteriors)?;
@@ -138,8 +143,9 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
 pub fn condition(samples: &SampleSet, options: &FitOptions, hyper: &Hyper) -> Result<Conditioned> {
     let (targets, offsets) = targets(samples, options)?;
     let watch = Watch::new(&options.observer);
+    let noise = known_noise(samples, options.transform, 0..3);
     let (posterior, log_marginal_likelihood) =
-        Solver::condition(&options.problem(samples, targets, &watch), hyper)?;
+        Solver::condition(&options.problem(samples, targets, &noise, &watch), hyper)?;
     let origin = samples.origin.clone();
     let model = Model::new(origin, options.transform, options.mean, offsets, vec![posterior])?;
     Ok(Conditioned { model, log_marginal_likelihood })
@@ -154,6 +160,13 @@ fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, 
     if let Some(bad) = samples.values.as_flattened().iter().find(|x| !x.is_finite()) {
         return Err(Error::argument("sample values", "finite numbers", bad));
     }
+    let sigma = &samples.sigma;
+    if !sigma.is_empty() && sigma.len() != n {
+        return Err(Error::argument("standard deviations", "none or one for each sample", sigma.len()));
+    }
+    if let Some(bad) = sigma.as_flattened().iter().find(|x| !(x.is_finite() && **x >= 0.0)) {
+        return Err(Error::argument("standard deviations", "finite numbers of at least 0", bad));
+    }
     options.transform.validate()?;
     let mut targets: Vec<Vec<f64>> =
         (0..3).map(|c| samples.values.iter().map(|v| options.transform.forward(v[c])).collect()).collect();
@@ -164,6 +177,24 @@ fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, 
     }
     Ok((targets, offsets))
 }
+
+/// The noise variance of each sample that its given standard deviation leads to, in squared target units and as
+/// a mean over the channels: `(sigma dg/df)^2`. Empty if the samples have no standard deviations.
+fn known_noise(samples: &SampleSet, transform: Transform, channels: std::ops::Range<usize>) -> Vec<f64> {
+    let variance = |(value, sigma): (&Rgb, &Rgb)| {
+        let count = channels.len() as f64;
+        let square = |c: usize| {
+            let slope = transform.slope_of_inverse(transform.forward(value[c]));
+            // A root has no slope at zero.
+            (sigma[c] / slope.max(f64::MIN_POSITIVE)).min(LARGEST_DEVIATION).powi(2)
+        };
+        channels.clone().map(square).sum::<f64>() / count
+    };
+    samples.values.iter().zip(&samples.sigma).map(variance).collect()
+}
+
+/// A standard deviation of a target that says nothing about it any more.
+const LARGEST_DEVIATION: f64 = 1e3;
 
 #[cfg(all(test, feature = "formats"))]
 mod tests {

@@ -13,6 +13,7 @@ pub use bake::{Baked, bake_mean, bake_sigma};
 pub use compress::{CellWeights, CompressOptions, InducingSize, compress};
 #[cfg(feature = "fit")]
 pub use fit::{Conditioned, Fit, FitOptions, condition, fit};
+pub(crate) use interval::interval_about;
 pub use interval::{IntervalOf, Intervals};
 
 use std::sync::Arc;
@@ -24,7 +25,6 @@ use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 use crate::gp::{Hyper, Posterior};
-use crate::model::interval::interval_about;
 use crate::sample::{InputSpace, MeanFunction, Provenance, Transform};
 
 /// A fitted Gaussian-process BRDF: `f = g^-1(m + GP(wi, wo))` for each channel.

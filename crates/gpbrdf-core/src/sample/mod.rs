@@ -1,6 +1,7 @@
 //! Where to measure, what was measured, and how measurements become inputs of kernels and targets of
 //! processes.
 
+mod blind_spots;
 mod detect;
 pub(crate) mod lattice;
 pub(crate) mod layout;

@@ -246,7 +246,10 @@ mod tests {
                 if at.is_above_horizon() {
                     let [light, viewer] = [wi, wo].map(|w| stretched(w.z, w.z.clamp(-1.0, 1.0).acos()));
                     let [_, sum, difference] = space.coordinates(at);
-                    assert!((sum - light - viewer).abs() < 1e-7 && (difference - (light - viewer).abs()).abs() < 1e-7);
+                    assert!(
+                        (sum - light - viewer).abs() < 1e-7
+                            && (difference - (light - viewer).abs()).abs() < 1e-7
+                    );
                 }
             }
         }

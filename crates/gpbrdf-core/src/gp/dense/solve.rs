@@ -15,6 +15,7 @@ use crate::sample::space::InputSpace;
 /// Finds hyper-parameters by maximum marginal likelihood and conditions the process at them. The kernels
 /// measure the joint distance, so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
+    problem.refuse_known_noise()?;
     let (space, points) = inputs(problem)?;
     let search = DenseFit {
         x: points.as_flattened(),
@@ -31,6 +32,7 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
 
 /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
 pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
+    problem.refuse_known_noise()?;
     let (space, points) = inputs(problem)?;
     let targets = &problem.targets;
     let y: Vec<f64> = (0..points.len()).flat_map(|i| targets.iter().map(move |t| t[i])).collect();

@@ -14,6 +14,7 @@ use crate::sample::lattice::LatticeLayout;
 
 /// Finds hyper-parameters by maximum marginal likelihood and conditions the process at them.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
+    problem.refuse_known_noise()?;
     let lattice = on_lattice(problem)?;
     let data = data_on(lattice, &problem.targets);
     let kernels = std::array::from_fn(|k| starting_kernel(&problem.kernel[k], &data.coordinates[k]));
@@ -24,6 +25,7 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
 
 /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
 pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
+    problem.refuse_known_noise()?;
     let lattice = on_lattice(problem)?;
     let data = data_on(lattice, &problem.targets);
     let hyper = LatticeHyper::try_from(hyper)?;

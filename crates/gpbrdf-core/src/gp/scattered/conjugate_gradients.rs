@@ -46,13 +46,16 @@ pub(super) fn solve(
     precondition(&r, &mut z);
     let mut p = z.clone();
     let mut kp = vec![0.0; y.len()];
-    let energies = |r: &[f64], z: &[f64]| -> Vec<f64> {
-        r.chunks(n).zip(z.chunks(n)).map(|(r, z)| dot(r, z)).collect()
-    };
+    let energies =
+        |r: &[f64], z: &[f64]| -> Vec<f64> { r.chunks(n).zip(z.chunks(n)).map(|(r, z)| dot(r, z)).collect() };
     let mut energy = energies(&r, &z);
     let start = energy.clone();
     let residual = |energy: &[f64]| {
-        energy.iter().zip(&start).map(|(e, s)| if *s > 0.0 { (e / s).sqrt() } else { 0.0 }).fold(0.0, f64::max)
+        energy
+            .iter()
+            .zip(&start)
+            .map(|(e, s)| if *s > 0.0 { (e / s).sqrt() } else { 0.0 })
+            .fold(0.0, f64::max)
     };
     let mut best = Convergence { iterations: 0, residual: residual(&energy) };
     while best.residual > TOLERANCE && best.iterations < MOST_ITERATIONS {

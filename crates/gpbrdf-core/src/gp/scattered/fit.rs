@@ -212,12 +212,12 @@ impl State {
             let row = &residuals[i * channels..(i + 1) * channels];
             row.iter().map(|r| r * r).sum::<f64>() / variances[i]
         };
-        let mean = |i: usize| residuals[i * channels..(i + 1) * channels].iter().sum::<f64>() / channels as f64;
+        let mean =
+            |i: usize| residuals[i * channels..(i + 1) * channels].iter().sum::<f64>() / channels as f64;
         let level = |i: usize| data.y.iter().map(|y| y[i]).sum::<f64>() / channels as f64;
         let mut changed = false;
         for i in 0..data.len() {
-            let witnesses: Vec<usize> =
-                nearest.of(i).iter().take(WITNESSES).map(|&j| j as usize).collect();
+            let witnesses: Vec<usize> = nearest.of(i).iter().take(WITNESSES).map(|&j| j as usize).collect();
             // Around a highlight the nearest samples differ from each other, too, and a highlight is brightest
             // where no other sample is as near to the mirror direction.
             let mut levels: Vec<f64> = witnesses.iter().map(|&j| level(j)).collect();
@@ -273,14 +273,7 @@ impl State {
             &mut |_| problem.watch.evaluation(),
         )?;
         let channels = data.y.len();
-        let gp = ScatteredGp::new(
-            self.kernel,
-            self.noise_variance,
-            all,
-            data.x.clone(),
-            channels,
-            weights,
-        )?;
+        let gp = ScatteredGp::new(self.kernel, self.noise_variance, all, data.x.clone(), channels, weights)?;
         Ok((gp, value))
     }
 

@@ -68,8 +68,10 @@ impl ScatteredGp {
     ) -> Result<Self> {
         kernel.validate()?;
         let n = noise.len();
-        if n == 0 || channels == 0 || inputs.len() != n * kernel.dimension() || weights.len() != n * channels {
-            let found = format!("{n} noise variances, {} coordinates, {} weights", inputs.len(), weights.len());
+        if n == 0 || channels == 0 || inputs.len() != n * kernel.dimension() || weights.len() != n * channels
+        {
+            let found =
+                format!("{n} noise variances, {} coordinates, {} weights", inputs.len(), weights.len());
             return Err(Error::argument("samples", "at least one, each with coordinates and weights", found));
         }
         let bad = std::iter::once(&noise_variance).chain(&noise).find(|v| !(**v >= 0.0 && v.is_finite()));

@@ -120,13 +120,12 @@ fn four_thousand_samples_agree_with_the_dense_process() {
     let mut normal = move || (0..12).map(|_| random.next_unit()).sum::<f64>() - 6.0;
     let space = InputSpace::PolarAngles;
     for noise in [0.03, 0.0] {
-        let set = crate::SampleSet::measure(&*material.brdf, &crate::Layout::Random { count: 4096, seed: 3 });
+        let set = crate::SampleSet::measure(material, &crate::Layout::Random { count: 4096, seed: 3 });
         let set = set.unwrap();
         let points: Vec<[f64; 3]> = set.angles.iter().map(|&a| space.coordinates(a)).collect();
         let y: Vec<Vec<f64>> = (0..CHANNELS)
             .map(|c| {
-                let y: Vec<f64> =
-                    set.values.iter().map(|v| (v[c] + 1e-3).ln() + noise * normal()).collect();
+                let y: Vec<f64> = set.values.iter().map(|v| (v[c] + 1e-3).ln() + noise * normal()).collect();
                 let mean = y.iter().sum::<f64>() / y.len() as f64;
                 y.into_iter().map(|y| y - mean).collect()
             })
@@ -191,7 +190,8 @@ fn known_noise_counts_for_its_sample_only() {
             state.condition(problem, &data, &mut FitReport::default()).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
         })
     };
-    let without = |v: &[f64]| -> Vec<f64> { v.iter().enumerate().filter(|(i, _)| *i != 7).map(|p| *p.1).collect() };
+    let without =
+        |v: &[f64]| -> Vec<f64> { v.iter().enumerate().filter(|(i, _)| *i != 7).map(|p| *p.1).collect() };
     let fewer: Vec<[f64; 3]> = points.iter().enumerate().filter(|(i, _)| *i != 7).map(|p| *p.1).collect();
     let left: Vec<Vec<f64>> = y.iter().map(|y| without(y)).collect();
     let (ignored, absent) = (mean_at(&points, &y, &known), mean_at(&fewer, &left, &[]));
@@ -244,10 +244,8 @@ fn the_order_of_samples_changes_no_bit() {
 
 #[test]
 fn angles_are_chords_and_broken_parts_are_refused() {
-    let kernel = Kernel {
-        metric: vec![AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord],
-        ..kernel()
-    };
+    let kernel =
+        Kernel { metric: vec![AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord], ..kernel() };
     let make = |noise: Vec<f64>, weights: usize| {
         ScatteredGp::new(kernel.clone(), 0.1, noise, vec![0.5; 6], 1, vec![1.0; weights])
     };

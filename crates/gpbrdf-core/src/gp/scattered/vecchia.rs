@@ -32,9 +32,10 @@ pub(super) fn log_likelihood(
             || Scratch::new(count, process.kernel),
             |scratch, block| {
                 let mut gradient = vec![0.0; parameters];
-                let value = block.iter().map(|&i| i as usize).map(|i| {
-                    scratch.log_density(process, y, i, neighbours.of(i), &mut gradient)
-                });
+                let value = block
+                    .iter()
+                    .map(|&i| i as usize)
+                    .map(|i| scratch.log_density(process, y, i, neighbours.of(i), &mut gradient));
                 (value.sum(), gradient)
             },
         )
