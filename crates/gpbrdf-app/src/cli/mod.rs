@@ -11,6 +11,7 @@ mod parse;
 mod predict;
 mod render;
 mod reproduce;
+mod sample;
 mod shader;
 mod slice;
 mod terminal;
@@ -46,6 +47,8 @@ enum Command {
     Bake(bake::Bake),
     /// Sample and fit; write the model only.
     Fit(fit::Fit),
+    /// What an instrument would measure: scattered samples with noise and outliers, as a CSV file.
+    Sample(sample::Sample),
     /// Values with 95 % intervals at the directions of a CSV file.
     Predict(predict::Predict),
     /// Compare a prediction with a truth.
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
+        Command::Sample(command) => command.run(&terminal),
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
