@@ -16,5 +16,6 @@ mod cli {
     mod process;
     mod render;
     mod reproduce;
+    mod sample;
     mod usage;
 }

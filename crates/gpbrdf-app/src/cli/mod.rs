@@ -12,6 +12,7 @@ mod predict;
 mod reading;
 mod render;
 mod reproduce;
+mod sample;
 mod shader;
 mod slice;
 mod terminal;
@@ -47,6 +48,8 @@ enum Command {
     Bake(bake::Bake),
     /// Sample and fit; write the model only.
     Fit(fit::Fit),
+    /// What an instrument would measure: scattered samples with noise and outliers, as a CSV file.
+    Sample(sample::Sample),
     /// Values with 95 % intervals at the directions of a CSV file.
     Predict(predict::Predict),
     /// Compare a prediction with a truth.
@@ -87,6 +90,7 @@ pub fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
+        Command::Sample(command) => command.run(&terminal),
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),

@@ -16,7 +16,7 @@ pub(crate) enum LayoutChoice {
     /// A product lattice in the warped box.
     #[default]
     Lattice,
-    /// Random directions.
+    /// Random directions, uniform in the warped box.
     Random,
     /// Random cells of the table.
     Cells,

@@ -81,6 +81,9 @@ impl Measured {
             Layout::Lattice(lattice) if spec.solver == Solver::Dense => announce(lattice.len())?,
             Layout::Lattice(_) => {}
             Layout::Random { count, .. } | Layout::Cells { count, .. } => announce(*count)?,
+            Layout::Hemisphere { count, .. } => announce(*count)?,
+            Layout::InPlane(scan) => announce(scan.count)?,
+            Layout::Gonio(grid) => announce(grid.len())?,
         }
         Ok(Self { samples: Arc::new(source.measure(&layout)?), symmetry, key })
     }

@@ -19,6 +19,12 @@ pub enum SampleLayout {
     Samples,
     /// All cells of a table that are above the horizon.
     Table,
+    /// Light and viewer drawn uniformly in solid angle.
+    Hemisphere,
+    /// A scan in the plane of incidence.
+    InPlane,
+    /// The grid of a goniometer.
+    Gonio,
 }
 
 impl SampleLayout {
@@ -31,6 +37,9 @@ impl SampleLayout {
             Self::Cells => "cells",
             Self::Samples => "samples",
             Self::Table => "table",
+            Self::Hemisphere => "hemisphere",
+            Self::InPlane => "in_plane",
+            Self::Gonio => "gonio",
         }
     }
 }

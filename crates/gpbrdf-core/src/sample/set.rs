@@ -7,7 +7,7 @@ use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::{Brdf, Rgb};
 use crate::sample::lattice::LatticeLayout;
-use crate::sample::layout::Layout;
+use crate::sample::layout::{Layout, hemisphere_directions, random_cells, random_directions};
 use crate::sample::origin::{Provenance, SampleLayout};
 
 /// One measured value of a BRDF.
@@ -48,30 +48,43 @@ pub struct SampleSet {
 }
 
 impl SampleSet {
-    /// Evaluates `brdf` at the directions of a layout, in parallel. Only the layout is recorded as the
-    /// origin; [`Source::measure`](crate::Source::measure) fills in the rest.
+    /// Evaluates `brdf` at the directions of a layout, in parallel. Layouts that imitate an instrument give
+    /// [`SampleSet::directions`], the others angles only. Only the layout is recorded as the origin;
+    /// [`Source::measure`](crate::Source::measure) fills in the rest.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an invalid lattice.
+    /// [`Error::InvalidArgument`](crate::Error::InvalidArgument) for an invalid lattice, scan or grid, and
+    /// for a number of directions that a layout does not allow.
     pub fn measure(brdf: &dyn Brdf, layout: &Layout) -> Result<Self> {
-        let (angles, lattice, kind) = match layout {
+        let (directions, lattice, kind) = match layout {
             Layout::Lattice(lattice) => {
                 lattice.validate()?;
-                (lattice.directions(), Some(lattice.clone()), SampleLayout::Lattice)
+                (Chosen::Angles(lattice.directions()), Some(lattice.clone()), SampleLayout::Lattice)
             }
             Layout::Random { count, seed } => {
                 let v_max = LatticeLayout::default().v_max;
-                (super::layout::random_directions(*count, v_max, *seed), None, SampleLayout::Random)
+                (Chosen::Angles(random_directions(*count, v_max, *seed)), None, SampleLayout::Random)
             }
             Layout::Cells { count, seed } => {
-                (super::layout::random_cells(*count, *seed), None, SampleLayout::Cells)
+                (Chosen::Angles(random_cells(*count, *seed)), None, SampleLayout::Cells)
+            }
+            Layout::Hemisphere { count, seed } => {
+                (Chosen::Pairs(hemisphere_directions(*count, *seed)?), None, SampleLayout::Hemisphere)
+            }
+            Layout::InPlane(scan) => (Chosen::Pairs(scan.directions()?), None, SampleLayout::InPlane),
+            Layout::Gonio(grid) => (Chosen::Pairs(grid.directions()?), None, SampleLayout::Gonio),
+        };
+        let (angles, directions) = match directions {
+            Chosen::Angles(angles) => (angles, Vec::new()),
+            Chosen::Pairs(pairs) => {
+                (pairs.iter().map(|[wi, wo]| HalfDiff::from_directions(wi, wo)).collect(), pairs)
             }
         };
         let mut values = vec![[0.0; 3]; angles.len()];
         let blocks = angles.par_chunks(BLOCK).zip(values.par_chunks_mut(BLOCK));
         blocks.for_each(|(angles, values)| brdf.eval_many(angles, values));
         let origin = Provenance { layout: kind, lattice, ..Provenance::default() };
-        Ok(Self { angles, values, origin, ..Self::default() })
+        Ok(Self { angles, values, directions, origin, ..Self::default() })
     }
 
     /// The number of samples.
@@ -133,6 +146,13 @@ impl SampleSet {
             Sample { wi, wo, value }
         })
     }
+}
+
+/// What a layout chooses.
+enum Chosen {
+    Angles(Vec<HalfDiff>),
+    /// `[wi, wo]`, with a rotation about the normal.
+    Pairs(Vec<[Vector3<f64>; 2]>),
 }
 
 /// Number of directions that a task evaluates at a time.
