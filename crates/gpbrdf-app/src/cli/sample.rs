@@ -10,6 +10,7 @@ use gpbrdf_core::sample::{Disturbance, GonioGrid, InPlaneScan, MIN_DRAWN_COSINE}
 use gpbrdf_core::{Layout, SampleSet, Source};
 
 use super::input::open;
+use super::reading::Reading;
 use super::terminal::Terminal;
 
 /// Directions of `--layout random`.
@@ -75,7 +76,7 @@ impl Sample {
             bail!("--outliers: expected at most {MAX_OUTLIERS}, found {}", self.outliers);
         }
         let layout = self.layout()?;
-        let source = terminal.stage("Loading", || open(&self.input))?;
+        let source = terminal.stage("Loading", || open(&self.input, Reading::default(), terminal))?;
         let to_file = self.output != Path::new("-");
         // Created before the work, so that nobody waits for samples that cannot be written.
         let file = if to_file { Some(AtomicFile::create(&self.output)?) } else { None };

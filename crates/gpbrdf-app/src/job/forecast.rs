@@ -1,7 +1,8 @@
-//! What a dense fit will take, said before it starts.
+//! What a fit will take, said before it starts.
 
 use anyhow::Result;
-use gpbrdf_core::gp::dense_cost;
+use gpbrdf_core::Solver;
+use gpbrdf_core::gp::{dense_cost, scattered_seconds};
 
 /// Evaluations of likelihood and gradient that a dense search usually takes.
 const DENSE_EVALUATIONS: usize = 40;
@@ -12,19 +13,24 @@ const LONG: f64 = 10.0;
 /// Fewer samples than this take a second and a few MB; measuring the machine's speed would take longer.
 const SHORT_RUN: usize = 1000;
 
-/// A sentence about a dense fit to `samples` samples, if it will take long.
+/// A sentence about a fit to `samples` samples off a lattice, if it will take long.
 ///
 /// # Errors
 /// More memory than is available.
-pub(crate) fn forecast(samples: usize, per_channel: bool) -> Result<Option<String>> {
+pub(crate) fn forecast(samples: usize, solver: Solver, per_channel: bool) -> Result<Option<String>> {
     if samples < SHORT_RUN {
         return Ok(None);
+    }
+    // Each channel has a search of its own.
+    let searches = if per_channel { 3.0 } else { 1.0 };
+    if solver != Solver::Dense {
+        let seconds = searches * scattered_seconds(samples);
+        return Ok((seconds > LONG).then(|| format!("a fit to {samples} samples takes about {seconds:.0} s")));
     }
     let cost = dense_cost(samples, 3, DENSE_EVALUATIONS);
     cost.check()?;
     let gib = cost.bytes / (1u64 << 30) as f64;
-    // Each channel has a search of its own.
-    let seconds = if per_channel { 3.0 * cost.seconds } else { cost.seconds };
+    let seconds = searches * cost.seconds;
     Ok((seconds > LONG)
         .then(|| format!("a dense fit to {samples} samples takes {gib:.1} GiB and about {seconds:.0} s")))
 }

@@ -1,6 +1,7 @@
 //! What a run has to say, for machines and for people.
 
 use gpbrdf_core::base::number::significant;
+use gpbrdf_core::judge::LeftOut;
 use gpbrdf_core::sample::SampleLayout;
 use gpbrdf_core::{LatticeLayout, Metrics};
 use serde::Serialize;
@@ -29,6 +30,8 @@ pub(crate) struct Report {
     pub(crate) evaluations: usize,
     pub(crate) converged: bool,
     pub(crate) at_bound: Vec<String>,
+    /// Every sample as it is predicted from all others, and the suspected outliers.
+    pub(crate) leave_one_out: Option<LeftOut>,
     pub(crate) seconds: Seconds,
     pub(crate) backend: String,
     pub(crate) metrics: Option<Metrics>,
@@ -55,6 +58,7 @@ impl Report {
             evaluations: reports.iter().map(|report| report.evaluations).sum(),
             converged: reports.iter().all(|report| report.converged),
             at_bound: reports.iter().flat_map(|report| report.at_bound.iter().cloned()).collect(),
+            leave_one_out: outcome.fitted.left_out.clone(),
             seconds,
             backend: outcome.baked.as_ref().map_or_else(|| CPU.to_owned(), |baked| baked.backend.clone()),
             metrics: outcome.metrics.clone(),
@@ -91,6 +95,9 @@ impl Report {
         if !self.at_bound.is_empty() {
             lines.push(format!("  at a bound of its range: {}", self.at_bound.join(", ")));
         }
+        if let Some(left_out) = &self.leave_one_out {
+            lines.extend(left_out_lines(left_out));
+        }
         if let Some(m) = &self.metrics {
             lines.extend(metric_lines(m));
         }
@@ -103,6 +110,40 @@ impl Report {
         }
         lines.join("\n")
     }
+}
+
+/// The largest number of outliers that a summary lists; the report in JSON has all of them.
+const LISTED: usize = 10;
+
+/// What a fit says about its own samples.
+fn left_out_lines(left_out: &LeftOut) -> Vec<String> {
+    let m = &left_out.metrics;
+    let mut lines = vec![format!(
+        "  left out one by one: median |ln error| {:.4}; 95 % interval covers {:.1} % of the samples",
+        m.median_abs_log,
+        100.0 * m.coverage_95
+    )];
+    let outliers = &left_out.outliers;
+    if !outliers.is_empty() {
+        lines.push(format!(
+            "  {} suspected outlier{} given a larger noise (--outliers keep takes them like all others):",
+            outliers.len(),
+            if outliers.len() == 1 { " was" } else { "s were" }
+        ));
+        lines.extend(outliers.iter().take(LISTED).map(|outlier| {
+            let place = match outlier.line {
+                Some(line) => format!("line {line}"),
+                None => format!("sample {}", outlier.sample + 1),
+            };
+            let list = |rgb: [f64; 3]| rgb.map(|v| significant(v, 4)).join(" ");
+            let [lower, upper] = outlier.expected;
+            format!("    {place}: {}, expected {} to {}", list(outlier.value), list(lower), list(upper))
+        }));
+        if outliers.len() > LISTED {
+            lines.push(format!("    and {} more (--json lists all)", outliers.len() - LISTED));
+        }
+    }
+    lines
 }
 
 /// The metrics that people look at first.

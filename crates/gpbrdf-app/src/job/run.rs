@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
-use gpbrdf_core::judge::{CellMetrics, Interval};
+use gpbrdf_core::judge::{CellMetrics, Interval, LeftOut};
 use gpbrdf_core::model::Conditioned;
 use gpbrdf_core::{
     BrdfTable, CompressOptions, Content, Environment, Error, Fit, FitOptions, FitReport, Metrics, Model,
@@ -126,15 +126,26 @@ pub(crate) struct Fitted {
     pub(crate) measured: Option<Measured>,
     /// How the search went, for each channel with hyper-parameters of its own; empty without a search.
     pub(crate) reports: Vec<FitReport>,
+    /// Every sample as it is predicted from all others, where the solver leaves samples out.
+    pub(crate) left_out: Option<LeftOut>,
     /// Log marginal likelihood, all channels together; unknown for a model from a file.
     pub(crate) log_marginal_likelihood: Option<f64>,
 }
 
 impl Fitted {
-    fn searched(fit: Fit, measured: Option<Measured>) -> Self {
+    /// A model of which nothing else is known.
+    fn from_file(model: Arc<Model>) -> Self {
+        Self { model, measured: None, reports: Vec::new(), left_out: None, log_marginal_likelihood: None }
+    }
+
+    fn searched(fit: Fit, measured: Option<Measured>) -> Result<Self> {
+        let left_out = match &measured {
+            Some(measured) => LeftOut::new(&measured.samples, &fit)?,
+            None => None,
+        };
         let Fit { model, reports } = fit;
         let value = reports.iter().map(|report| report.log_marginal_likelihood).sum();
-        Self { model: Arc::new(model), measured, reports, log_marginal_likelihood: Some(value) }
+        Ok(Self { model: Arc::new(model), measured, reports, left_out, log_marginal_likelihood: Some(value) })
     }
 }
 
@@ -202,7 +213,7 @@ impl Run {
         let (fitted, is_kept) = match &job.source.content {
             Content::Model(model) if job.keep_model => {
                 let model = Arc::new((**model).clone());
-                (Fitted { model, measured: None, reports: Vec::new(), log_marginal_likelihood: None }, true)
+                (Fitted::from_file(model), true)
             }
             _ => (self.fit(job)?, false),
         };
@@ -237,19 +248,16 @@ impl Run {
             let solver = options.solver.resolve(samples.lattice().is_some());
             if let Some(hyper) = spec.hyper.as_ref().filter(|hyper| hyper.solver == solver) {
                 let Conditioned { model, log_marginal_likelihood } = condition(&samples, &options, hyper)?;
-                return Ok(Fitted {
-                    model: Arc::new(model),
-                    measured: Some(measured),
-                    reports: Vec::new(),
-                    log_marginal_likelihood: Some(log_marginal_likelihood),
-                });
+                let log_marginal_likelihood = Some(log_marginal_likelihood);
+                let fitted = Fitted::from_file(Arc::new(model));
+                return Ok(Fitted { measured: Some(measured), log_marginal_likelihood, ..fitted });
             }
             let observer = gpbrdf_core::Observer::new(move |evaluations| {
                 observer.progress(Progress::Evaluations(evaluations));
                 if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
             let fit = fit(&samples, &FitOptions { observer, ..options })?;
-            Ok(Fitted::searched(fit, Some(measured)))
+            Fitted::searched(fit, Some(measured))
         })
     }
 
@@ -259,7 +267,7 @@ impl Run {
         let options =
             CompressOptions { symmetry: symmetry(spec, source.brdf()?, &*self.observer), ..options };
         let fit = self.stage(Stage::Fit, || Ok(compress(&table, &options, source.provenance())?))?;
-        Ok(Fitted::searched(fit, None))
+        Fitted::searched(fit, None)
     }
 
     /// The tables of a model.

@@ -56,13 +56,14 @@ impl Measured {
     /// A source without data, a broken layout, or too many samples for a dense fit.
     pub(super) fn new(source: &Source, spec: &ModelSpec, observer: &dyn Observer) -> Result<Self> {
         let announce = |samples: usize| {
-            let note = forecast(samples, spec.per_channel)?;
+            let note = forecast(samples, spec.solver, spec.per_channel)?;
             note.iter().for_each(|note| observer.note(note));
             anyhow::Ok(())
         };
         let key = spec.sample_key();
         if let Content::Samples(samples) = &source.content {
             announce(samples.len())?;
+            samples.blind_spots().iter().for_each(|spot| observer.note(spot));
             let symmetry = match spec.symmetry {
                 SymmetryChoice::Auto | SymmetryChoice::Bilateral => Symmetry::Bilateral,
                 SymmetryChoice::Reciprocal => Symmetry::Reciprocal,

@@ -4,8 +4,9 @@
 use anyhow::{Result, bail};
 use clap::Args;
 use gpbrdf_core::gp::OptimizeOptions;
+use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{
-    CompressOptions, Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Solver, Source,
+    CompressOptions, Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Outliers, Solver, Source,
     Symmetry, Transform,
 };
 use serde::{Deserialize, Serialize};
@@ -17,8 +18,8 @@ use super::kernels::Kernels;
 /// Number of values that the paper takes, 2.58 % of a table.
 pub(crate) const PAPER_SAMPLES: usize = 37_616;
 
-/// Samples off a lattice are solved densely: a number that takes seconds.
-const DENSE_SAMPLES: usize = 2_000;
+/// Number of samples off a lattice: one that takes seconds.
+const SCATTERED_SAMPLES: usize = 2_000;
 
 /// The largest lattice: a table has 1,458,000 cells, so more nodes than this hold nothing new, and take
 /// gigabytes.
@@ -71,6 +72,14 @@ pub(crate) struct ModelSpec {
     /// Noise variance in squared target units, or auto to find it.
     #[arg(long, value_name = "VARIANCE|auto", default_value_t, allow_hyphen_values = true)]
     pub(crate) noise: NoiseChoice,
+    /// Let the likelihood alone decide on the hyper-parameters of samples off a lattice, as in the paper, instead
+    /// of weak priors for what the samples leave open.
+    #[arg(long)]
+    pub(crate) no_hyper_priors: bool,
+    /// What to do about suspected outliers among scattered samples: take them like all others, or give them a
+    /// larger noise. They are listed either way where the noise is larger.
+    #[arg(long, default_value = "downweight", value_parser = named::<Outliers>(&["keep", "downweight"]))]
+    pub(crate) outliers: Outliers,
     /// Seed of random layouts and restarts.
     #[arg(long, value_name = "SEED", default_value_t)]
     pub(crate) seed: u64,
@@ -102,6 +111,8 @@ impl Default for ModelSpec {
             epsilon: 1e-3,
             mean: MeanFunction::default(),
             noise: NoiseChoice::default(),
+            no_hyper_priors: false,
+            outliers: Outliers::default(),
             seed: 0,
             restarts: 0,
             per_channel: false,
@@ -140,14 +151,14 @@ impl ModelSpec {
             }
         }
         if !self.kernel.are_alike() {
-            bail!("--kernel: expected one kernel for all axes of a dense fit, found {}", self.kernel);
+            bail!("--kernel: expected one kernel for all axes of samples off a lattice, found {}", self.kernel);
         }
         Ok(())
     }
 
     /// Number of samples of a source that can be evaluated at any direction, off a lattice.
     pub(super) fn scattered_samples(&self) -> usize {
-        self.samples.unwrap_or(DENSE_SAMPLES)
+        self.samples.unwrap_or(SCATTERED_SAMPLES)
     }
 
     /// Where to measure a source of this symmetry.
@@ -185,8 +196,14 @@ impl ModelSpec {
     /// # Errors
     /// A kernel of an unknown name.
     pub(super) fn fit_options(&self, symmetry: Symmetry) -> Result<FitOptions> {
-        let lattice = LatticeLayout::default();
-        let node_density = self.node_density.unwrap_or(lattice.node_density);
+        // A density of nodes is one of the warped box, which also knows materials that are not bilateral.
+        let space = if symmetry == Symmetry::Bilateral && self.node_density.is_none() {
+            InputSpace::PolarAngles
+        } else {
+            let lattice = LatticeLayout::default();
+            let node_density = self.node_density.unwrap_or(lattice.node_density);
+            LatticeLayout { node_density, symmetry, ..lattice }.space().into()
+        };
         Ok(FitOptions {
             solver: self.solver,
             kernel: self.kernel.shapes(self.nu)?,
@@ -194,7 +211,9 @@ impl ModelSpec {
             mean: self.mean,
             noise: self.noise.noise(),
             per_channel: self.per_channel,
-            space: LatticeLayout { node_density, symmetry, ..lattice }.space().into(),
+            hyper_priors: !self.no_hyper_priors,
+            outliers: self.outliers,
+            space,
             optimize: OptimizeOptions {
                 restarts: self.restarts,
                 seed: self.seed,

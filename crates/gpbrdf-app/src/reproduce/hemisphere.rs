@@ -121,6 +121,7 @@ fn fit_model(model: &str, count: usize) -> Result<Prediction> {
         metrics: &[AxisMetric::Linear; 2],
         shapes: &[Shape::RationalQuadratic { alpha: 2.0 }],
         noise: Noise::Optimized,
+        priors: None,
         options: &OptimizeOptions { max_iterations: 60, ..OptimizeOptions::default() },
     };
     let (gp, _) = search.run(&|| Ok(()))?;

@@ -38,6 +38,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) known_noise: &'a [f64],
     /// Whether hyper-parameters have priors.
     pub(crate) priors: bool,
+    /// The variance that targets usually have, for these priors; `None` where only the targets tell.
+    pub(crate) usual_variance: Option<f64>,
     /// What is done about outliers.
     pub(crate) outliers: Outliers,
     /// Settings of the search.

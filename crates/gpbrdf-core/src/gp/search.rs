@@ -6,12 +6,12 @@ use crate::gp::report::Noise;
 use crate::gp::{LogNormal, Parameter};
 use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, Shape};
 
-/// The prior of the noise variance relative to the variance of the targets: a deviation of 1 %, within a factor
-/// of 10 or so.
-const NOISE_PRIOR: (f64, f64) = (1e-4, 2.5);
+/// The prior of the noise variance relative to the usual variance of targets: a deviation of about 1 %, within a
+/// factor of 10 or so.
+const NOISE_PRIOR: (f64, f64) = (2.5e-5, 2.5);
 
-/// The prior of a signal variance relative to the variance of the targets.
-const VARIANCE_PRIOR: (f64, f64) = (1.0, 2.0);
+/// Standard deviation of the logarithm of a signal variance about the usual variance of targets.
+const VARIANCE_DEVIATION: f64 = 1.2;
 
 /// The prior of the mixture parameter of a rational quadratic kernel.
 const ALPHA_PRIOR: (f64, f64) = (1.0, 1.5);
@@ -23,15 +23,16 @@ pub(crate) struct SearchStart {
     pub(crate) kernel: Kernel,
     pub(crate) parameters: Vec<Parameter>,
     noise: Noise,
-    /// Mean square of the targets.
+    /// The usual variance of targets, or their mean square.
     variance: f64,
 }
 
 impl SearchStart {
     /// The usual start for targets of zero mean, `[sample][channel]` or in any other order, whose coordinates
-    /// cover `extents`.
+    /// cover `extents`. Very few targets may all be alike, so where the variance that targets usually have is
+    /// known, the parameters are not bounded by a hundredth of it.
     pub(crate) fn new(
-        targets: &[f64],
+        (targets, usual_variance): (&[f64], Option<f64>),
         channels: usize,
         extents: &[f64],
         metrics: &[AxisMetric],
@@ -39,7 +40,8 @@ impl SearchStart {
         noise: Noise,
     ) -> Self {
         let values = targets.len();
-        let variance = (targets.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64).max(1e-12);
+        let found = targets.iter().map(|y| y * y).sum::<f64>() / values.max(1) as f64;
+        let variance = found.max(usual_variance.map_or(1e-12, |usual| 0.01 * usual));
         let kernel = starting_kernel(extents, metrics, shapes, variance);
         let mut parameters = parameters(&kernel, extents, values / channels, variance);
         if noise == Noise::Optimized {
@@ -51,11 +53,11 @@ impl SearchStart {
                 prior: None,
             });
         }
-        Self { kernel, parameters, noise, variance }
+        Self { kernel, parameters, noise, variance: usual_variance.unwrap_or(variance) }
     }
 
-    /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the variance
-    /// of the targets, of the noise variance about 1e-4 of it. What the samples determine they hardly change;
+    /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the usual
+    /// variance of targets, of the noise variance about 2.5e-5 of it. What the samples determine they hardly change;
     /// what the samples leave open they decide.
     pub(crate) fn with_priors(mut self, usual_lengths: [(f64, f64); 3]) -> Self {
         let terms = self.kernel.terms.len() as f64;
@@ -63,9 +65,9 @@ impl SearchStart {
         for (k, parameter) in self.parameters.iter_mut().enumerate() {
             let (median, deviation) = match kinds.get(k) {
                 Some(ParameterKind::LengthScale(axis)) => usual_lengths[(*axis).min(2)],
-                Some(ParameterKind::Variance) => (VARIANCE_PRIOR.0 * self.variance / terms, VARIANCE_PRIOR.1),
+                Some(ParameterKind::Variance) => (self.variance / terms, VARIANCE_DEVIATION),
                 Some(ParameterKind::Alpha) => ALPHA_PRIOR,
-                Some(ParameterKind::Weight) => (1.0, VARIANCE_PRIOR.1),
+                Some(ParameterKind::Weight) => (1.0, VARIANCE_DEVIATION),
                 None => (NOISE_PRIOR.0 * self.variance, NOISE_PRIOR.1),
             };
             let prior = LogNormal::new(median, deviation);

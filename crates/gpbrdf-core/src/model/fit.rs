@@ -24,8 +24,8 @@ pub struct FitOptions {
     /// The rule for the noise variance.
     pub noise: Noise,
     /// Whether the hyper-parameters of scattered samples have weak priors, which decide what the samples leave
-    /// open: length scales about 0.4 of the range of their coordinate, a noise of about 1 % of the standard
-    /// deviation of the targets. Without them the likelihood alone decides, as in the paper.
+    /// open: length scales, signal variance and noise about those that measured materials usually have.
+    /// Without them the likelihood alone decides, as in the paper.
     pub hyper_priors: bool,
     /// What is done about samples that contradict all samples around them.
     pub outliers: Outliers,
@@ -81,6 +81,7 @@ impl FitOptions {
             noise: self.noise,
             known_noise,
             priors: self.hyper_priors,
+            usual_variance: self.transform.usual_variance(),
             outliers: self.outliers,
             optimize: &self.optimize,
             watch,

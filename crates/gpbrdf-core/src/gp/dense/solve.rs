@@ -23,7 +23,7 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
         metrics: &space.metrics(),
         shapes: &problem.kernel[0],
         noise: problem.noise,
-        priors: problem.priors.then(|| space.usual_lengths()),
+        priors: problem.priors.then(|| (space.usual_lengths(), problem.usual_variance)),
         options: problem.optimize,
     };
     let (gp, report) = search.run(&|| problem.watch.evaluation())?;

@@ -10,6 +10,7 @@ use super::product::Covariance;
 use super::vecchia::{InverseFactor, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
+use crate::base::simd::dot;
 use crate::gp::problem::{Outliers, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
@@ -20,8 +21,8 @@ use crate::kernel::{Kernel, Points};
 const FEW: (usize, usize) = (1000, 40);
 const MANY: usize = 24;
 
-/// Number of earlier samples that each conditional of the preconditioner keeps, and of the likelihood that is
-/// reported: more of them make fewer products with the covariance.
+/// Number of earlier samples that each conditional of the preconditioner keeps: more of them make fewer products
+/// with the covariance.
 const PRECONDITIONER: usize = 48;
 
 /// The likelihood of a search is summed over at most this number of samples, spread evenly over the order. Each
@@ -106,7 +107,7 @@ pub(super) fn search(problem: &Problem<'_>, data: &Data) -> Result<(State, FitRe
     let n = data.len();
     let extents: Vec<f64> = (0..3).map(|k| extent(&data.x, 3, k, metrics[k])).collect();
     let start = SearchStart::new(
-        data.y.concat().as_slice(),
+        (&data.y.concat(), problem.usual_variance.filter(|_| problem.priors)),
         data.y.len(),
         &extents,
         &metrics,
@@ -261,19 +262,19 @@ impl State {
         let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(PRECONDITIONER);
         let (shared, all) = data.noise(self.noise_variance, &self.weights);
         let process = Process { kernel: &self.kernel, x: &data.x, noise: &all, noise_slope: &shared };
-        let (value, _) = log_likelihood(&process, &data.y, &neighbours, &evenly(n, n));
         let preconditioner = InverseFactor::new(&process, &neighbours);
         let points = Points::new(&data.x, &self.kernel.metric);
         let diagonal: Vec<f64> = (0..n).map(|i| process.diagonal(i) - self.kernel.prior_variance()).collect();
         let covariance = Covariance { kernel: &self.kernel, points: &points, diagonal: &diagonal };
-        let (weights, _) = conjugate_gradients::solve(
-            &covariance,
-            &preconditioner,
-            data.y.concat().as_slice(),
-            &mut |_| problem.watch.evaluation(),
-        )?;
+        let y = data.y.concat();
+        let solution = conjugate_gradients::solve(&covariance, &preconditioner, &y, &|| {
+            problem.watch.evaluation()
+        })?;
         let channels = data.y.len();
-        let gp = ScatteredGp::new(self.kernel, self.noise_variance, all, data.x.clone(), channels, weights)?;
+        let constant = channels as f64 * (n as f64 * std::f64::consts::TAU.ln() + solution.log_det);
+        let value = -0.5 * (dot(&y, &solution.x) + constant);
+        let (noise, x) = (all, data.x.clone());
+        let gp = ScatteredGp::new(self.kernel, self.noise_variance, noise, x, channels, solution.x)?;
         Ok((gp, value))
     }
 

@@ -8,6 +8,8 @@ mod conditional;
 #[cfg(feature = "fit")]
 mod conjugate_gradients;
 #[cfg(feature = "fit")]
+pub(crate) mod cost;
+#[cfg(feature = "fit")]
 mod fit;
 mod neighbours;
 pub(crate) mod posterior;

@@ -42,6 +42,7 @@ fn with_problem<R>(targets: &[Vec<f64>], outliers: Outliers, run: impl FnOnce(&P
         noise: Noise::Optimized,
         known_noise: &[],
         priors: true,
+        usual_variance: None,
         outliers,
         optimize: &optimize,
         watch: &watch,

@@ -78,6 +78,21 @@ impl<'a> InverseFactor<'a> {
         Self { neighbours, coefficients, variances }
     }
 
+    /// The logarithm of the determinant of the covariance that this factor is exact for: `sum_i ln v_i`.
+    pub(super) fn log_det(&self) -> f64 {
+        self.variances.iter().map(|v| v.ln()).sum()
+    }
+
+    /// A sample of the process with that covariance, from standard normal numbers.
+    pub(super) fn sample(&self, normal: &mut dyn FnMut() -> f64) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.variances.len());
+        for (i, (b, v)) in self.coefficients.iter().zip(&self.variances).enumerate() {
+            let known: f64 = b.iter().zip(self.neighbours.of(i)).map(|(b, &j)| b * out[j as usize]).sum();
+            out.push(known + v.sqrt() * normal());
+        }
+        out
+    }
+
     /// `out = sum_i u_i u_i^T r` for one column. Cost: `2 n m` multiply-adds.
     pub(super) fn apply(&self, r: &[f64], out: &mut [f64]) {
         out.fill(0.0);
