@@ -21,7 +21,7 @@ use crate::base::error::Result;
 use crate::formats::format::{Format, Reader};
 use crate::formats::measured::collector::{Collector, Row};
 use crate::formats::measured::input::{Input, shortened};
-use crate::formats::measured::options::{ReadOptions, Zenith};
+use crate::formats::measured::options::{AngleUnit, ReadOptions, Zenith};
 use crate::formats::measured::text::angles::{Angles, Place};
 use crate::formats::measured::text::colours::Colours;
 use crate::formats::measured::text::columns::Angle;
@@ -160,6 +160,9 @@ pub(crate) fn samples(
         ));
     }
     let unit = angles.unit(&input)?;
+    if unit == AngleUnit::Radians && !angles.unit_is_said() {
+        collector.notice("angles are taken as radians, as azimuths are multiples of pi/2".to_owned());
+    }
     let mut colours = Colours::new(&input, &columns, header, &numbers, &mut collector)?;
     for (i, &line) in lines.iter().enumerate() {
         let directed = angles.directions(&input, header, unit, row_angles[i], line)?;
