@@ -32,6 +32,16 @@ fn a_broken_file_is_named_until_it_is_read_and_nothing_is_lost() {
 }
 
 #[test]
+fn what_is_worth_knowing_about_a_file_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("dark.csv");
+    let rows = "10,0,20,180,1\n10,0,30,90,0.5\n10,0,40,90,-0.0005\n";
+    std::fs::write(&file, format!("theta_i,phi_i,theta_o,phi_o,f\n{rows}")).unwrap();
+    let mut driver = Driver::new(&[file]);
+    driver.wait("a message", |d| d.shows("dark: 1 value is negative, down to -0.0005 (line 4)"));
+}
+
+#[test]
 fn materials_are_opened_shown_and_removed() {
     let mut driver = Driver::new(&[PathBuf::from("ward"), PathBuf::from("lambert")]);
     driver.fitted();

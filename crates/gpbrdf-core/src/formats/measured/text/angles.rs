@@ -102,6 +102,11 @@ impl Angles {
         }
     }
 
+    /// Whether names, a row of units or the options say the unit.
+    pub(crate) fn unit_is_said(&self) -> bool {
+        self.unit.is_some()
+    }
+
     /// The unit of all angles.
     pub(crate) fn unit(&self, input: &Input<'_>) -> Result<AngleUnit> {
         self.unit.map_or_else(|| self.evidence.unit(input, true), Ok)

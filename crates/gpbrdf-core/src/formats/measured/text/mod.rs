@@ -1,6 +1,7 @@
 //! Tables as text, of any instrument: samples, directions, and samples written as CSV.
 
 mod angles;
+mod colours;
 pub(crate) mod columns;
 pub(crate) mod comment;
 pub(crate) mod directions;

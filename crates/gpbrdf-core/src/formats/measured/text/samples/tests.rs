@@ -1,6 +1,6 @@
 use super::*;
 use crate::brdf::angles::direction;
-use crate::formats::measured::{AngleUnit, ValueKind};
+use crate::formats::measured::ValueKind;
 use crate::formats::mutate::{Random, mutations};
 use crate::formats::{Source, write_samples_csv};
 use crate::sample::Sample;
@@ -392,6 +392,7 @@ fn measured_tables_are_read() {
     assert_eq!(value, 0.414_445);
     let source = Source::open(data.join("rgl/reference_values.csv")).unwrap();
     let reference = source.samples().unwrap();
+    assert!(reference.notices[0].starts_with("angles are taken as radians"), "{:?}", reference.notices);
     assert_eq!(reference.values[0], [0.05940903, 0.1002018, 0.01572966]);
     assert!((reference.directions[1][1] - direction(0.261799, std::f64::consts::PI)).norm() < 1e-6);
 }
