@@ -6,8 +6,8 @@ use clap::Args;
 use gpbrdf_core::gp::OptimizeOptions;
 use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{
-    CompressOptions, Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Outliers, Solver, Source,
-    Symmetry, Transform,
+    CompressOptions, Content, FitOptions, Hyper, LatticeLayout, Layout, MeanFunction, Outliers, Solver,
+    Source, Symmetry, Transform,
 };
 use serde::{Deserialize, Serialize};
 
@@ -151,7 +151,10 @@ impl ModelSpec {
             }
         }
         if !self.kernel.are_alike() {
-            bail!("--kernel: expected one kernel for all axes of samples off a lattice, found {}", self.kernel);
+            bail!(
+                "--kernel: expected one kernel for all axes of samples off a lattice, found {}",
+                self.kernel
+            );
         }
         Ok(())
     }

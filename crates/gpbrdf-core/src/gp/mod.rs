@@ -44,6 +44,6 @@ pub use optimize::{LogNormal, OptimizeOptions, Optimum, Parameter, maximize};
 #[cfg(feature = "fit")]
 pub use problem::{Observer, Outliers};
 #[cfg(feature = "fit")]
-pub use scattered::cost::scattered_seconds;
-#[cfg(feature = "fit")]
 pub use report::{FitReport, Noise};
+#[cfg(feature = "fit")]
+pub use scattered::cost::scattered_seconds;

@@ -39,7 +39,7 @@ impl SampleSet {
                  vector): the height of a highlight is extrapolated"
             ));
         }
-        let cosines = || self.angles.iter().map(|a| a.cosines());
+        let cosines = || self.iter().map(|sample| (sample.wi.z, sample.wo.z));
         let polar = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
         let farthest = cosines().map(|(i, o)| polar(i.min(o))).fold(0.0, f64::max);
         if farthest < GRAZING {
@@ -48,7 +48,6 @@ impl SampleSet {
                  extrapolated"
             ));
         }
-        // By reciprocity either direction may be the light.
         let range = |values: &mut dyn Iterator<Item = f64>| {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
         };

@@ -60,7 +60,8 @@ impl DenseFit<'_> {
         let made = |data: &Data<'_>| {
             let extents: Vec<f64> =
                 (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
-            let start = SearchStart::new((data.y, usual_variance), data.channels, &extents, metrics, shapes, noise);
+            let start =
+                SearchStart::new((data.y, usual_variance), data.channels, &extents, metrics, shapes, noise);
             priors.map_or(start.clone(), |(lengths, _)| start.with_priors(lengths))
         };
         let mut problem = made(&data);

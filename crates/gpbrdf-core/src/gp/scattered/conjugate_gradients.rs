@@ -1,8 +1,8 @@
 //! Preconditioned conjugate gradients for several right-hand sides at once, and the determinant that comes with
 //! them.
 
+use super::preconditioner::Preconditioner;
 use super::product::Covariance;
-use super::vecchia::InverseFactor;
 use crate::base::error::{Error, Result};
 use crate::base::linalg::symmetric_eigen;
 use crate::base::random::SplitMix64;
@@ -10,7 +10,7 @@ use crate::base::simd::dot;
 
 /// The search ends when every residual, measured by the preconditioner, is this small relative to its
 /// right-hand side. That is the error of the solution in standard deviations of the samples given each other.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 5e-6;
 
 /// The largest number of products with the covariance.
 const MOST_ITERATIONS: usize = 400;
@@ -34,7 +34,7 @@ pub(super) struct Solution {
 /// estimates `ln det K`. `watch` is called before each product; an error that it returns ends the search.
 ///
 /// Source: M. R. Hestenes and E. Stiefel, "Methods of Conjugate Gradients for Solving Linear Systems" (1952),
-/// with the preconditioner `M^-1` of [`InverseFactor`]. Residuals are measured by `r^T M^-1 r`. The determinant
+/// with the preconditioner `M^-1` of [`Preconditioner`]. Residuals are measured by `r^T M^-1 r`. The determinant
 /// is `ln det M + tr ln(M^-1 K)`; its second part is a mean over samples `z` of the process with covariance `M`,
 /// which are further right-hand sides: the coefficients of their searches are those of the Lanczos process, and
 /// `z^T M^-1 z (e_1^T ln(T) e_1)` with its tridiagonal matrix `T` is the quadrature. Source: J. R. Gardner et
@@ -44,7 +44,7 @@ pub(super) struct Solution {
 /// A residual that is still above 1e-2 after 400 products, and the errors of `watch`.
 pub(super) fn solve(
     covariance: &Covariance<'_>,
-    preconditioner: &InverseFactor<'_>,
+    preconditioner: &Preconditioner,
     y: &[f64],
     watch: &dyn Fn() -> Result<()>,
 ) -> Result<Solution> {

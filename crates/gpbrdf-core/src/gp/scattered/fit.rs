@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::conditional::{Process, Scratch};
 use super::conjugate_gradients;
 use super::neighbours::{Embedded, Neighbours, scrambled_order};
+use super::preconditioner::Preconditioner;
 use super::product::Covariance;
-use super::vecchia::{InverseFactor, log_likelihood};
+use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
 use crate::base::simd::dot;
@@ -20,10 +21,6 @@ use crate::kernel::{Kernel, Points};
 /// Number of earlier samples that each conditional of the likelihood keeps, for few samples and for many.
 const FEW: (usize, usize) = (1000, 40);
 const MANY: usize = 24;
-
-/// Number of earlier samples that each conditional of the preconditioner keeps: more of them make fewer products
-/// with the covariance.
-const PRECONDITIONER: usize = 48;
 
 /// The likelihood of a search is summed over at most this number of samples, spread evenly over the order. Each
 /// of them is conditioned on the nearest of all samples before it.
@@ -164,8 +161,9 @@ fn maximise(
         problem.watch.evaluation()?;
         let noise_variance = start.set(&mut kernel, p)?;
         let (shared, all) = data.noise(noise_variance, weights);
-        let process = Process { kernel: &kernel, x: &data.x, noise: &all, noise_slope: &shared };
-        let (value, mut gradient) = log_likelihood(&process, &data.y, &neighbours, &subset);
+        let process = Process { kernel: &kernel, x: &data.x, noise: &all };
+        let targets = Targets { y: &data.y, shared_noise: &shared };
+        let (value, mut gradient) = log_likelihood(&process, &targets, &neighbours, &subset);
         gradient.truncate(p.len());
         gradient.iter_mut().for_each(|g| *g *= scale);
         Ok((scale * value, gradient))
@@ -182,13 +180,13 @@ impl State {
     /// Every sample as it is predicted from the nearest others, in the scrambled order: residuals, rows with one
     /// value per channel, and variances of a measurement of weight 1.
     fn leave_one_out(&self, data: &Data) -> (Vec<f64>, Vec<f64>, Neighbours) {
-        let (shared, all) = data.noise(self.noise_variance, &self.weights);
-        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all, noise_slope: &shared };
+        let (_, all) = data.noise(self.noise_variance, &self.weights);
+        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all };
         let nearest = Embedded::new(&data.x, &self.kernel).nearest_others(NEAREST);
         let rows: Vec<(Vec<f64>, f64)> = (0..data.len())
             .into_par_iter()
             .map_init(
-                || Scratch::new(NEAREST, &self.kernel),
+                || Scratch::new(NEAREST),
                 |scratch, i| {
                     let given = nearest.of(i);
                     let (b, latent) = scratch.condition(&process, process.point(i), given);
@@ -259,23 +257,22 @@ impl State {
         if self.weights.iter().any(|&w| w != 1.0) {
             report.weights = data.as_given(&self.weights, 1);
         }
-        let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(PRECONDITIONER);
-        let (shared, all) = data.noise(self.noise_variance, &self.weights);
-        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all, noise_slope: &shared };
-        let preconditioner = InverseFactor::new(&process, &neighbours);
+        let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(NEAREST);
+        let (_, all) = data.noise(self.noise_variance, &self.weights);
+        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all };
+        let preconditioner = Preconditioner::new(&process, neighbours);
         let points = Points::new(&data.x, &self.kernel.metric);
         let diagonal: Vec<f64> = (0..n).map(|i| process.diagonal(i) - self.kernel.prior_variance()).collect();
         let covariance = Covariance { kernel: &self.kernel, points: &points, diagonal: &diagonal };
         let y = data.y.concat();
-        let solution = conjugate_gradients::solve(&covariance, &preconditioner, &y, &|| {
-            problem.watch.evaluation()
-        })?;
+        let solution =
+            conjugate_gradients::solve(&covariance, &preconditioner, &y, &|| problem.watch.evaluation())?;
         let channels = data.y.len();
         let constant = channels as f64 * (n as f64 * std::f64::consts::TAU.ln() + solution.log_det);
         let value = -0.5 * (dot(&y, &solution.x) + constant);
         let (noise, x) = (all, data.x.clone());
         let gp = ScatteredGp::new(self.kernel, self.noise_variance, noise, x, channels, solution.x)?;
-        Ok((gp, value))
+        Ok((gp.with_far_field(preconditioner.into_far_field()), value))
     }
 
     /// Known hyper-parameters, with all samples of weight 1.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+#[cfg(feature = "fit")]
 use crate::base::random::SplitMix64;
 use crate::base::simd::vectorized;
 use crate::kernel::{AxisMetric, Kernel, KernelBody};
@@ -12,6 +13,7 @@ const STRIP: usize = 256;
 /// An order of the samples that looks random but depends on nothing except their coordinates and targets, so
 /// that results do not depend on the order in which samples were given. `x` has `n` rows of `dimension`
 /// coordinates, `y` one column of `n` targets per channel.
+#[cfg(feature = "fit")]
 pub(super) fn scrambled_order(x: &[f64], dimension: usize, y: &[Vec<f64>]) -> Vec<u32> {
     let bits = |i: usize| {
         let coordinates = x[i * dimension..(i + 1) * dimension].iter();
@@ -108,6 +110,7 @@ impl Embedded {
     }
 
     /// For every point, its nearest ones among all others.
+    #[cfg(feature = "fit")]
     pub(super) fn nearest_others(&self, count: usize) -> Neighbours {
         self.of_all(self, count, |i| (self.len, Some(i)))
     }
@@ -147,6 +150,11 @@ impl Neighbours {
 
     pub(super) fn len(&self) -> usize {
         self.sets.len()
+    }
+
+    /// The largest number of neighbours of a point, at least 1.
+    pub(super) fn largest(&self) -> usize {
+        self.sets.iter().map(Vec::len).max().unwrap_or(0).max(1)
     }
 }
 

@@ -1,5 +1,4 @@
-//! The nearest-neighbour approximation of a Gaussian process: its likelihood, and a sparse factor of the
-//! inverse covariance.
+//! The likelihood of the nearest-neighbour approximation of a Gaussian process.
 //!
 //! The joint density is written as a product of conditionals in some order, and each conditional keeps the
 //! nearest of the samples before it: `p(y) = prod_i p(y_i | y_c(i))`. Source: A. V. Vecchia, "Estimation and
@@ -9,34 +8,43 @@
 
 use rayon::prelude::*;
 
-use super::conditional::{Process, Scratch};
+use super::conditional::{JITTER, Process, Scratch};
 use super::neighbours::Neighbours;
 
 /// Number of conditionals of a parallel task.
 const BLOCK: usize = 32;
 
+/// What the derivatives of a likelihood need besides the process.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Targets<'a> {
+    /// Targets, one column per channel.
+    pub(super) y: &'a [Vec<f64>],
+    /// The part of each sample's noise variance that is proportional to the shared one.
+    pub(super) shared_noise: &'a [f64],
+}
+
 /// The sum of the log densities of the samples `subset`, each given its neighbours, over all channels, and the
 /// derivatives with respect to the kernel's log-parameters and, last, the logarithm of the noise variance that
-/// all samples share. `y` has one column per channel. Cost: `O(m^3)` per sample.
+/// all samples share. Cost: `O(m^3)` per sample.
 pub(super) fn log_likelihood(
     process: &Process<'_>,
-    y: &[Vec<f64>],
+    targets: &Targets<'_>,
     neighbours: &Neighbours,
     subset: &[u32],
 ) -> (f64, Vec<f64>) {
     let parameters = process.kernel.n_parameters() + 1;
-    let count = largest(neighbours);
+    let count = neighbours.largest();
     let blocks: Vec<(f64, Vec<f64>)> = subset
         .par_chunks(BLOCK)
         .map_init(
-            || Scratch::new(count, process.kernel),
-            |scratch, block| {
+            || Conditional::new(count, process.kernel.n_parameters()),
+            |conditional, block| {
                 let mut gradient = vec![0.0; parameters];
-                let value = block
-                    .iter()
-                    .map(|&i| i as usize)
-                    .map(|i| scratch.log_density(process, y, i, neighbours.of(i), &mut gradient));
-                (value.sum(), gradient)
+                let density = |i: u32| {
+                    let i = i as usize;
+                    conditional.log_density(process, targets, i, neighbours.of(i), &mut gradient)
+                };
+                (block.iter().copied().map(density).sum(), gradient)
             },
         )
         .collect();
@@ -47,63 +55,108 @@ pub(super) fn log_likelihood(
     })
 }
 
-fn largest(neighbours: &Neighbours) -> usize {
-    (0..neighbours.len()).map(|i| neighbours.of(i).len()).max().unwrap_or(0).max(1)
-}
-
-/// A sparse factor of the inverse covariance, `K^-1 ~ sum_i u_i u_i^T` with `u_i = (e_i - b_i) / sqrt(v_i)`,
-/// where `b_i` and `v_i` are the coefficients and the variance of sample `i` given its neighbours.
+/// Work arrays of one thread.
 #[derive(Debug)]
-pub(super) struct InverseFactor<'a> {
-    neighbours: &'a Neighbours,
-    coefficients: Vec<Vec<f64>>,
-    variances: Vec<f64>,
+struct Conditional {
+    scratch: Scratch,
+    /// Derivatives of kernel values: of each pair of samples, of each sample with the point, of the point with
+    /// itself.
+    pairs: Vec<f64>,
+    point: Vec<f64>,
+    own: Vec<f64>,
+    /// Coefficients of the samples in the mean of the point.
+    coefficients: Vec<f64>,
+    /// `K^-1 y` of one channel, and its sum over the channels times residual over variance.
+    weights: Vec<f64>,
+    side: Vec<f64>,
 }
 
-impl<'a> InverseFactor<'a> {
-    /// Computes all conditionals. Cost: `O(n m^3)`.
-    pub(super) fn new(process: &Process<'_>, neighbours: &'a Neighbours) -> Self {
-        let count = largest(neighbours);
-        let (coefficients, variances) = (0..neighbours.len())
-            .into_par_iter()
-            .map_init(
-                || Scratch::new(count, process.kernel),
-                |scratch, i| {
-                    let (b, latent) = scratch.condition(process, process.point(i), neighbours.of(i));
-                    let floor = super::conditional::JITTER * process.kernel.prior_variance();
-                    (b.to_vec(), latent.max(floor) + process.noise[i])
-                },
-            )
-            .unzip();
-        Self { neighbours, coefficients, variances }
-    }
-
-    /// The logarithm of the determinant of the covariance that this factor is exact for: `sum_i ln v_i`.
-    pub(super) fn log_det(&self) -> f64 {
-        self.variances.iter().map(|v| v.ln()).sum()
-    }
-
-    /// A sample of the process with that covariance, from standard normal numbers.
-    pub(super) fn sample(&self, normal: &mut dyn FnMut() -> f64) -> Vec<f64> {
-        let mut out = Vec::with_capacity(self.variances.len());
-        for (i, (b, v)) in self.coefficients.iter().zip(&self.variances).enumerate() {
-            let known: f64 = b.iter().zip(self.neighbours.of(i)).map(|(b, &j)| b * out[j as usize]).sum();
-            out.push(known + v.sqrt() * normal());
+impl Conditional {
+    fn new(count: usize, parameters: usize) -> Self {
+        Self {
+            scratch: Scratch::new(count),
+            pairs: vec![0.0; count * (count + 1) / 2 * parameters],
+            point: vec![0.0; count * parameters],
+            own: vec![0.0; parameters],
+            coefficients: vec![0.0; count],
+            weights: vec![0.0; count],
+            side: vec![0.0; count],
         }
-        out
     }
 
-    /// `out = sum_i u_i u_i^T r` for one column. Cost: `2 n m` multiply-adds.
-    pub(super) fn apply(&self, r: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
-        for (i, (b, v)) in self.coefficients.iter().zip(&self.variances).enumerate() {
-            let given = self.neighbours.of(i);
-            let known: f64 = b.iter().zip(given).map(|(b, &j)| b * r[j as usize]).sum();
-            let scaled = (r[i] - known) / v;
-            out[i] += scaled;
-            for (b, &j) in b.iter().zip(given) {
-                out[j as usize] -= b * scaled;
+    /// The log density of the targets of sample `i` given those of the samples `given`, summed over the
+    /// channels; its derivatives are added to `gradient`.
+    ///
+    /// With coefficients `b = K^-1 k`, variance `v` and residual `r = y - b^T y_given`, for a parameter `p`
+    /// and `q = dk - dK b`: `dr = -q^T K^-1 y_given` and `dv = dk_ii - b^T dk - b^T q`.
+    fn log_density(
+        &mut self,
+        process: &Process<'_>,
+        targets: &Targets<'_>,
+        i: usize,
+        given: &[u32],
+        gradient: &mut [f64],
+    ) -> f64 {
+        let (m, parameters) = (given.len(), process.kernel.n_parameters());
+        let (point, at) = (process.point(i), |a: usize| process.point(given[a] as usize));
+        // A pair and its place in the lower triangle.
+        let place = |a: usize, b: usize| (a * (a + 1) / 2 + b) * parameters;
+        let (pairs, with_point) = (&mut self.pairs, &mut self.point);
+        let (coefficients, explained) = self.scratch.explain(
+            m,
+            |a, b| {
+                let out = &mut pairs[place(a, b)..place(a, b) + parameters];
+                process.kernel.gradient(at(a), at(b), out)
+            },
+            |a| process.diagonal(given[a] as usize),
+            |a| {
+                let out = &mut with_point[a * parameters..(a + 1) * parameters];
+                process.kernel.gradient(at(a), point, out)
+            },
+        );
+        self.coefficients[..m].copy_from_slice(coefficients);
+        let b = &self.coefficients[..m];
+        process.kernel.gradient(point, point, &mut self.own);
+        let least = process.noise[i].max(JITTER * process.kernel.prior_variance());
+        let variance = (process.diagonal(i) - explained).max(least);
+        let channels = targets.y.len() as f64;
+        let mut density = -0.5 * channels * (std::f64::consts::TAU * variance).ln();
+        let mut slope_of_variance = -0.5 * channels / variance;
+        self.side[..m].fill(0.0);
+        for y in targets.y {
+            let weights = &mut self.weights[..m];
+            weights.iter_mut().zip(given).for_each(|(w, &j)| *w = y[j as usize]);
+            let residual = y[i] - b.iter().zip(&*weights).map(|(b, y)| b * y).sum::<f64>();
+            density -= 0.5 * residual * residual / variance;
+            slope_of_variance += 0.5 * (residual / variance).powi(2);
+            self.scratch.solve(weights);
+            for (side, w) in self.side.iter_mut().zip(weights) {
+                *side += residual / variance * *w;
             }
         }
+        let Some((of_noise, of_kernel)) = gradient.split_last_mut() else { return density };
+        // What multiplies q in the derivative of the density.
+        let of_q = |a: usize| self.side[a] - slope_of_variance * b[a];
+        for (out, own) in of_kernel.iter_mut().zip(&self.own) {
+            *out += slope_of_variance * own;
+        }
+        *of_noise += slope_of_variance * targets.shared_noise[i];
+        for a in 0..m {
+            for l in 0..=a {
+                // -dK_al multiplies q_a b_l and q_l b_a. The prior variance has the same derivative everywhere.
+                let weight = if l == a { of_q(a) * b[a] } else { of_q(a) * b[l] + of_q(l) * b[a] };
+                let pair =
+                    if l == a { &self.own } else { &self.pairs[place(a, l)..place(a, l) + parameters] };
+                for (out, d) in of_kernel.iter_mut().zip(pair) {
+                    *out -= weight * d;
+                }
+            }
+            let weight = of_q(a) - slope_of_variance * b[a];
+            for (out, d) in of_kernel.iter_mut().zip(&self.point[a * parameters..(a + 1) * parameters]) {
+                *out += weight * d;
+            }
+            *of_noise -= of_q(a) * b[a] * targets.shared_noise[given[a] as usize];
+        }
+        density
     }
 }
