@@ -51,13 +51,13 @@ fn scattered(count: usize, seed: u64) -> SampleSet {
 
 fn dense_hyper(shape: Shape, variance: f64, length: f64) -> Hyper {
     let kernel = Kernel::ard(variance, shape, &[length, 1.3 * length, 2.0 * length]);
-    Hyper { solver: Solver::Dense, kernel, noise_variance: 1e-3 * variance }
+    Hyper { solver: Solver::Dense, kernel, noise_variance: 1e-3 * variance, space: None }
 }
 
 fn lattice_hyper(shape: Shape, variance: f64, length: f64) -> Hyper {
     let axes = AXES.map(|metric| (Kernel1d::new(shape, length), metric));
     let kernel = Kernel::product(variance, axes.to_vec());
-    Hyper { solver: Solver::Lattice, kernel, noise_variance: 1e-3 * variance }
+    Hyper { solver: Solver::Lattice, kernel, noise_variance: 1e-3 * variance, space: None }
 }
 
 /// A model on a small lattice and one of scattered samples, each with its largest prior variance.
@@ -68,7 +68,7 @@ fn models(shape: Shape, variance: f64, length: f64, symmetry: Symmetry, seed: u6
     let hyper = lattice_hyper(shape, variance, length);
     let lattice_model = condition(&on_lattice, &FitOptions::default(), &hyper).unwrap().model;
     let space = LatticeLayout { symmetry, ..LatticeLayout::default() }.space().into();
-    let options = FitOptions { space, ..FitOptions::default() };
+    let options = FitOptions { space: Some(space), ..FitOptions::default() };
     let hyper = dense_hyper(shape, variance, length);
     let dense_model = condition(&scattered(30, seed), &options, &hyper).unwrap().model;
     // Where phi is mirrored, k(x, x) is up to twice the variance.

@@ -14,7 +14,7 @@ fn model(layout: &Layout, solver: Solver) -> Option<Model> {
     let samples = source.measure(layout).ok()?;
     let optimize = OptimizeOptions { max_iterations: 8, ..OptimizeOptions::default() };
     let space = LatticeLayout::default().space().into();
-    let options = FitOptions { solver, optimize, space, ..FitOptions::default() };
+    let options = FitOptions { solver, optimize, space: Some(space), ..FitOptions::default() };
     Some(fit(&samples, &options).ok()?.model)
 }
 

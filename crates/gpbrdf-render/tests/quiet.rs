@@ -53,7 +53,7 @@ impl log::Log for Logger {
 fn fitted(layout: &Layout, options: FitOptions) -> Model {
     let source = Source::built_in("cherry-235").unwrap();
     let samples = source.measure(layout).unwrap();
-    let options = FitOptions { space: LatticeLayout::default().space().into(), ..options };
+    let options = FitOptions { space: Some(LatticeLayout::default().space().into()), ..options };
     fit(&samples, &options).unwrap().model
 }
 

@@ -201,11 +201,11 @@ impl ModelSpec {
     pub(super) fn fit_options(&self, symmetry: Symmetry) -> Result<FitOptions> {
         // A density of nodes is one of the warped box, which also knows materials that are not bilateral.
         let space = if symmetry == Symmetry::Bilateral && self.node_density.is_none() {
-            InputSpace::PolarAngles
+            None
         } else {
             let lattice = LatticeLayout::default();
             let node_density = self.node_density.unwrap_or(lattice.node_density);
-            LatticeLayout { node_density, symmetry, ..lattice }.space().into()
+            Some(InputSpace::from(LatticeLayout { node_density, symmetry, ..lattice }.space()))
         };
         Ok(FitOptions {
             solver: self.solver,

@@ -38,7 +38,7 @@ pub(super) fn paper_options(kernel: &[Shape]) -> FitOptions {
         solver: Solver::Dense,
         transform: Transform::Identity,
         mean: MeanFunction::Zero,
-        space: InputSpace::HalfDiff,
+        space: Some(InputSpace::HalfDiff),
         ..FitOptions::default()
     }
     .with_kernel(kernel)

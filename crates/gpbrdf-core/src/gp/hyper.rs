@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::base::error::{Error, Result};
 use crate::gp::solver::Solver;
 use crate::kernel::{Kernel, KernelBody, ParameterKind};
+use crate::sample::space::InputSpace;
 
 /// The smallest ratio of noise variance to signal variance. It keeps the covariance positive definite in f64.
 pub(crate) const MIN_NOISE_RATIO: f64 = 1e-9;
@@ -21,6 +22,9 @@ pub struct Hyper {
     pub kernel: Kernel,
     /// Noise variance, in squared target units.
     pub noise_variance: f64,
+    /// The input space of the kernel, where a solver has chosen it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<InputSpace>,
 }
 
 /// The role of a hyper-parameter.
@@ -117,7 +121,7 @@ mod tests {
             (Solver::Lattice, product, HyperKind::Alpha(Some(1))),
             (Solver::Dense, ard, HyperKind::Alpha(None)),
         ] {
-            let mut hyper = Hyper { solver, kernel, noise_variance: 1e-5 };
+            let mut hyper = Hyper { solver, kernel, noise_variance: 1e-5, space: None };
             let count = hyper.parameters().len();
             assert_eq!(count, 6);
             assert!(hyper.parameters().iter().any(|p| p.kind == alpha));

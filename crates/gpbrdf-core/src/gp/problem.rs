@@ -28,8 +28,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) lattice: Option<&'a LatticeLayout>,
     /// Zero-mean targets, `[channel][sample]`.
     pub(crate) targets: Vec<Vec<f64>>,
-    /// Input space for samples off a lattice.
-    pub(crate) space: InputSpace,
+    /// Input space for samples off a lattice, if it is not to be chosen.
+    pub(crate) space: Option<InputSpace>,
     /// For each axis, the shapes whose kernels are summed.
     pub(crate) kernel: &'a [Vec<Shape>; 3],
     /// The rule for the noise variance.

@@ -31,8 +31,9 @@ pub struct FitOptions {
     pub outliers: Outliers,
     /// Whether each channel gets its own hyper-parameters instead of shared ones.
     pub per_channel: bool,
-    /// Input space for samples off a lattice; those on a lattice use its own space.
-    pub space: InputSpace,
+    /// Input space for samples off a lattice; those on a lattice use its own space. `None` leaves the choice
+    /// among [`InputSpace::ISOTROPIC`] to the likelihood, or takes the first of them for the dense solver.
+    pub space: Option<InputSpace>,
     /// Settings of the search for hyper-parameters.
     pub optimize: OptimizeOptions,
     /// Called before each evaluation of the likelihood; it can cancel the fit.
@@ -50,7 +51,7 @@ impl Default for FitOptions {
             hyper_priors: true,
             outliers: Outliers::default(),
             per_channel: false,
-            space: InputSpace::PolarAngles,
+            space: None,
             optimize: OptimizeOptions::default(),
             observer: Observer::default(),
         }

@@ -118,17 +118,31 @@ pub enum InputSpace {
     /// `phi_d` where it has no meaning, at `theta_h = 0` and at `theta_d = 0`. Directions below the horizon
     /// have the coordinates of the horizon.
     PolarAngles,
+    /// `((theta_h / (pi/2))^0.7, theta_d / (pi/2), |a(theta_i) - a(theta_o)|)`: like [`InputSpace::PolarAngles`],
+    /// but with the angle between light and half vector for itself, which suits materials that send light back
+    /// to where it came from.
+    DifferenceAngle,
     /// `(theta_h, theta_d, phi_d)` in radians, without a warp. This is the paper's own setting.
     HalfDiff,
 }
 
 impl InputSpace {
+    /// The spaces among which the likelihood of scattered samples chooses.
+    pub const ISOTROPIC: [Self; 2] = [Self::PolarAngles, Self::DifferenceAngle];
+
     /// Coordinates of a pair of directions.
     #[must_use]
     pub fn coordinates(self, angles: HalfDiff) -> [f64; 3] {
         match self {
             Self::WarpedBox(warped) => warped.coordinates(angles),
-            Self::PolarAngles => polar_coordinates(angles),
+            Self::PolarAngles => {
+                let (half, [light, viewer]) = polar_coordinates(angles);
+                [half, light + viewer, (light - viewer).abs()]
+            }
+            Self::DifferenceAngle => {
+                let (half, [light, viewer]) = polar_coordinates(angles);
+                [half, above_horizon(angles) / FRAC_PI_2, (light - viewer).abs()]
+            }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
     }
@@ -140,20 +154,28 @@ impl InputSpace {
     pub fn validate(self) -> Result<()> {
         match self {
             Self::WarpedBox(warped) => warped.validate(),
-            Self::PolarAngles | Self::HalfDiff => Ok(()),
+            Self::PolarAngles | Self::DifferenceAngle | Self::HalfDiff => Ok(()),
         }
     }
 
     /// Whether `phi_d` and `pi - phi_d` have the same coordinates.
     #[must_use]
     pub fn is_bilateral(self) -> bool {
-        matches!(self, Self::PolarAngles | Self::WarpedBox(WarpedBox { symmetry: Symmetry::Bilateral, .. }))
+        let Self::WarpedBox(warped) = self else { return self.is_isotropic() };
+        warped.symmetry == Symmetry::Bilateral
     }
 
     /// Whether all directions below the horizon that share `theta_h` and `phi_d` have the same coordinates.
     #[must_use]
     pub fn stops_at_horizon(self) -> bool {
-        matches!(self, Self::PolarAngles | Self::WarpedBox(_))
+        self.is_isotropic() || matches!(self, Self::WarpedBox(_))
+    }
+
+    /// Whether every function of the coordinates is reciprocal, bilateral and isotropic, also where `phi_d` has no
+    /// meaning.
+    #[must_use]
+    pub fn is_isotropic(self) -> bool {
+        matches!(self, Self::PolarAngles | Self::DifferenceAngle)
     }
 
     /// The length scales that reflectances usually have along each coordinate: the median, and the standard
@@ -167,6 +189,7 @@ impl InputSpace {
         match self {
             Self::WarpedBox(_) => [(0.3, 0.8), (0.6, 0.8), (1.0, 0.8)],
             Self::PolarAngles => [(0.2, 0.8), (1.05, 0.5), (1.6, 0.4)],
+            Self::DifferenceAngle => [(0.2, 0.8), (0.35, 0.6), (1.6, 0.5)],
             Self::HalfDiff => [(0.4, 0.8), (0.8, 0.8), (1.5, 0.8)],
         }
     }
@@ -189,9 +212,15 @@ const HALF_ANGLE_EXPONENT: f64 = 0.7;
 /// stretching sets in.
 const STRETCH: (f64, f64) = (0.25, 0.05);
 
-fn polar_coordinates(angles: HalfDiff) -> [f64; 3] {
+/// `theta_d`, or that of the horizon for directions below it.
+fn above_horizon(angles: HalfDiff) -> f64 {
+    if angles.is_above_horizon() { angles.theta_d } else { theta_d_max(angles.theta_h, angles.phi_d) }
+}
+
+/// The coordinate of the half vector and those of both directions.
+fn polar_coordinates(angles: HalfDiff) -> (f64, [f64; 2]) {
     let HalfDiff { theta_h, phi_d, .. } = angles;
-    let theta_d = if angles.is_above_horizon() { angles.theta_d } else { theta_d_max(theta_h, phi_d) };
+    let theta_d = above_horizon(angles);
     let ((sin_h, cos_h), (sin_d, cos_d)) = (theta_h.sin_cos(), theta_d.sin_cos());
     let (sin_phi, cos_phi) = phi_d.sin_cos();
     // The polar angle from both sine and cosine is exact near the normal, too.
@@ -200,8 +229,7 @@ fn polar_coordinates(angles: HalfDiff) -> [f64; 3] {
         let z = cos_h * cos_d - side * sin_h * sin_d * cos_phi;
         stretched(z.max(0.0), x.hypot(sin_d * sin_phi).atan2(z.max(0.0)))
     };
-    let (light, viewer) = (polar(1.0), polar(-1.0));
-    [(theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT), light + viewer, (light - viewer).abs()]
+    ((theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT), [polar(1.0), polar(-1.0)])
 }
 
 /// `a(theta)` of [`InputSpace::PolarAngles`].
@@ -228,33 +256,34 @@ mod tests {
 
     #[test]
     fn polar_angles_have_every_symmetry_of_an_isotropic_reflectance() {
-        let space = InputSpace::PolarAngles;
-        let near = |a: HalfDiff, b: HalfDiff| {
-            let (a, b) = (space.coordinates(a), space.coordinates(b));
-            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
-        };
-        for (theta_h, theta_d) in [(0.0, 0.7), (0.4, 0.0), (0.3, 0.9), (1.2, 0.2), (0.0, 0.0)] {
-            for phi_d in [0.0, 0.3, 1.5, 2.9] {
-                let at = HalfDiff { theta_h, theta_d, phi_d };
-                near(at, HalfDiff { phi_d: phi_d + PI, ..at });
-                near(at, HalfDiff { phi_d: PI - phi_d, ..at });
-                if theta_h == 0.0 || theta_d == 0.0 {
-                    near(at, HalfDiff { phi_d: 0.0, ..at });
-                }
-                // The polar angles of both directions, computed from the directions.
-                let (wi, wo) = at.to_directions();
-                if at.is_above_horizon() {
-                    let [light, viewer] = [wi, wo].map(|w| stretched(w.z, w.z.clamp(-1.0, 1.0).acos()));
-                    let [_, sum, difference] = space.coordinates(at);
-                    assert!(
-                        (sum - light - viewer).abs() < 1e-7
-                            && (difference - (light - viewer).abs()).abs() < 1e-7
-                    );
+        for space in InputSpace::ISOTROPIC {
+            let near = |a: HalfDiff, b: HalfDiff| {
+                let (a, b) = (space.coordinates(a), space.coordinates(b));
+                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
+            };
+            for (theta_h, theta_d) in [(0.0, 0.7), (0.4, 0.0), (0.3, 0.9), (1.2, 0.2), (0.0, 0.0)] {
+                for phi_d in [0.0, 0.3, 1.5, 2.9] {
+                    let at = HalfDiff { theta_h, theta_d, phi_d };
+                    near(at, HalfDiff { phi_d: phi_d + PI, ..at });
+                    near(at, HalfDiff { phi_d: PI - phi_d, ..at });
+                    if theta_h == 0.0 || theta_d == 0.0 {
+                        near(at, HalfDiff { phi_d: 0.0, ..at });
+                    }
+                    // The polar angles of both directions, computed from the directions.
+                    let (wi, wo) = at.to_directions();
+                    if at.is_above_horizon() {
+                        let [light, viewer] = [wi, wo].map(|w| stretched(w.z, w.z.clamp(-1.0, 1.0).acos()));
+                        let [_, sum, difference] = InputSpace::PolarAngles.coordinates(at);
+                        assert!(
+                            (sum - light - viewer).abs() < 1e-7
+                                && (difference - (light - viewer).abs()).abs() < 1e-7
+                        );
+                    }
                 }
             }
+            let below = HalfDiff { theta_h: 1.0, theta_d: 1.3, phi_d: 0.2 };
+            near(below, HalfDiff { theta_d: 1.4, ..below });
         }
-        let below = HalfDiff { theta_h: 1.0, theta_d: 1.3, phi_d: 0.2 };
-        near(below, HalfDiff { theta_d: 1.4, ..below });
     }
 
     #[test]

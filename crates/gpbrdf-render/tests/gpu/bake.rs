@@ -112,7 +112,7 @@ fn dense_model(n: usize, symmetry: Symmetry, options: FitOptions) -> Model {
     let source = Source::built_in("cherry-235").unwrap();
     let samples = source.measure(&Layout::Random { count: n, seed: 7 }).unwrap();
     let space = LatticeLayout { symmetry, ..LatticeLayout::default() }.space();
-    let options = FitOptions { solver: Solver::Dense, space: space.into(), ..options };
+    let options = FitOptions { solver: Solver::Dense, space: Some(space.into()), ..options };
     fit(&samples, &options).unwrap().model
 }
 

@@ -92,7 +92,7 @@ impl Posterior for DensePosterior {
 
     fn hyper(&self) -> Option<Hyper> {
         let (kernel, noise_variance) = (self.gp.kernel().clone(), self.gp.noise_variance());
-        Some(Hyper { solver: Solver::Dense, kernel, noise_variance })
+        Some(Hyper { solver: Solver::Dense, kernel, noise_variance, space: Some(self.space) })
     }
 
     fn kernel_name(&self) -> String {

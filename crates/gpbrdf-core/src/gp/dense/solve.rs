@@ -50,7 +50,11 @@ pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn
 /// The input space and the coordinates of the samples in it. Samples on a lattice use the space of the
 /// lattice.
 fn inputs(problem: &Problem<'_>) -> Result<(InputSpace, Vec<[f64; 3]>)> {
-    let space = problem.lattice.map_or(problem.space, |lattice: &LatticeLayout| lattice.space().into());
+    let space = problem
+        .lattice
+        .map_or(problem.space.unwrap_or(InputSpace::ISOTROPIC[0]), |lattice: &LatticeLayout| {
+            lattice.space().into()
+        });
     space.validate()?;
     Ok((space, problem.angles.iter().map(|&angles| space.coordinates(angles)).collect()))
 }

@@ -17,6 +17,7 @@ use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
 use crate::gp::{LeaveOneOut, OptimizeOptions, Optimum, maximize};
 use crate::kernel::{Kernel, Points};
+use crate::sample::space::InputSpace;
 
 /// Number of earlier samples that each conditional of the likelihood keeps, for few samples and for many.
 const FEW: (usize, usize) = (1000, 40);
@@ -99,8 +100,8 @@ fn conditioned_on(n: usize) -> usize {
 }
 
 /// Finds hyper-parameters and weights.
-pub(super) fn search(problem: &Problem<'_>, data: &Data) -> Result<(State, FitReport)> {
-    let metrics = problem.space.metrics();
+pub(super) fn search(problem: &Problem<'_>, space: InputSpace, data: &Data) -> Result<(State, FitReport)> {
+    let metrics = space.metrics();
     let n = data.len();
     let extents: Vec<f64> = (0..3).map(|k| extent(&data.x, 3, k, metrics[k])).collect();
     let start = SearchStart::new(
@@ -111,7 +112,7 @@ pub(super) fn search(problem: &Problem<'_>, data: &Data) -> Result<(State, FitRe
         &problem.kernel[0],
         problem.noise,
     );
-    let mut start = if problem.priors { start.with_priors(problem.space.usual_lengths()) } else { start };
+    let mut start = if problem.priors { start.with_priors(space.usual_lengths()) } else { start };
     let mut evaluations = 0;
     let mut state = State { kernel: start.kernel.clone(), noise_variance: 0.0, weights: vec![1.0; n] };
     let mut found = maximise(problem, data, &start, &state.kernel, &state.weights, problem.optimize)?;

@@ -94,7 +94,7 @@ impl Posterior for ScatteredPosterior {
 
     fn hyper(&self) -> Option<Hyper> {
         let (kernel, noise_variance) = (self.gp.kernel.clone(), self.gp.noise_variance);
-        Some(Hyper { solver: Solver::Scattered, kernel, noise_variance })
+        Some(Hyper { solver: Solver::Scattered, kernel, noise_variance, space: Some(self.space) })
     }
 
     fn kernel_name(&self) -> String {

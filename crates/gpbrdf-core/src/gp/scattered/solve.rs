@@ -9,34 +9,52 @@ use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{Fitted, Problem};
 use crate::gp::report::{FitReport, Noise};
+use crate::sample::space::InputSpace;
 
-/// Finds hyper-parameters and conditions the process at them. The kernels measure the joint distance, so only
-/// the shapes of the first axis are used.
+/// Finds hyper-parameters in each of the spaces to choose from and conditions the process at those of the largest
+/// likelihood. The kernels measure the joint distance, so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     if let Noise::Fixed(variance) = problem.noise
         && !(variance > 0.0 && variance.is_finite())
     {
         return Err(Error::argument("noise variance", "a positive number", variance));
     }
-    let data = data(problem)?;
-    let (state, mut report) = search(problem, &data)?;
+    let spaces = problem.space.map_or(InputSpace::ISOTROPIC.to_vec(), |space| vec![space]);
+    let mut evaluations = 0;
+    let mut best: Option<(InputSpace, Data, State, FitReport)> = None;
+    for space in spaces {
+        let data = data(problem, space)?;
+        let (state, report) = search(problem, space, &data)?;
+        evaluations += report.evaluations;
+        let ahead = |(.., known): &(InputSpace, Data, State, FitReport)| {
+            known.log_marginal_likelihood < report.log_marginal_likelihood
+        };
+        if best.as_ref().is_none_or(ahead) {
+            best = Some((space, data, state, report));
+        }
+    }
+    let Some((space, data, state, mut report)) = best else {
+        return Err(Error::argument("input spaces", "at least one", "none"));
+    };
     let (gp, value) = state.condition(problem, &data, &mut report)?;
     report.log_marginal_likelihood = value;
-    Ok((Arc::new(ScatteredPosterior { gp, space: problem.space }), report))
+    report.evaluations = evaluations;
+    Ok((Arc::new(ScatteredPosterior { gp, space }), report))
 }
 
 /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
 pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
-    let data = data(problem)?;
+    let space = problem.space.or(hyper.space).unwrap_or(InputSpace::ISOTROPIC[0]);
+    let data = data(problem, space)?;
     let state = State::known(hyper.kernel.clone(), hyper.noise_variance, &data);
     let (gp, value) = state.condition(problem, &data, &mut FitReport::default())?;
-    Ok((Arc::new(ScatteredPosterior { gp, space: problem.space }), value))
+    Ok((Arc::new(ScatteredPosterior { gp, space }), value))
 }
 
-fn data(problem: &Problem<'_>) -> Result<Data> {
-    problem.space.validate()?;
-    let points: Vec<[f64; 3]> =
-        problem.angles.iter().map(|&angles| problem.space.coordinates(angles)).collect();
+/// The samples in the coordinates of a space.
+fn data(problem: &Problem<'_>, space: InputSpace) -> Result<Data> {
+    space.validate()?;
+    let points: Vec<[f64; 3]> = problem.angles.iter().map(|&angles| space.coordinates(angles)).collect();
     if let Some(bad) = points.as_flattened().iter().find(|x| !x.is_finite()) {
         return Err(Error::argument("coordinate", "a finite number", bad));
     }

@@ -37,7 +37,7 @@ fn with_problem<R>(targets: &[Vec<f64>], outliers: Outliers, run: impl FnOnce(&P
         angles: &[],
         lattice: None,
         targets: targets.to_vec(),
-        space: InputSpace::PolarAngles,
+        space: Some(InputSpace::PolarAngles),
         kernel: &[vec![Shape::Matern52], vec![Shape::Matern52], vec![Shape::Matern52]],
         noise: Noise::Optimized,
         known_noise: &[],
@@ -133,7 +133,7 @@ fn four_thousand_samples_agree_with_the_dense_process() {
             .collect();
         let (gp, value) = with_problem(&y, Outliers::Keep, |problem| {
             let data = Data::new(&points, &y, &[]);
-            let (state, mut report) = search(problem, &data).unwrap();
+            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
             state.condition(problem, &data, &mut report).unwrap()
         });
         let (kernel, own) = (gp.kernel.clone(), gp.noise_variance);
@@ -211,7 +211,7 @@ fn outliers_are_found_and_nothing_else() {
     let fit = |outliers| {
         with_problem(&y, outliers, |problem| {
             let data = Data::new(&points, &y, &[]);
-            let (state, mut report) = search(problem, &data).unwrap();
+            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
             let (gp, _) = state.condition(problem, &data, &mut report).unwrap();
             (gp.noise_variance.sqrt(), report)
         })
@@ -232,7 +232,7 @@ fn the_order_of_samples_changes_no_bit() {
     let fit = |points: &[[f64; 3]], y: &[Vec<f64>]| {
         with_problem(y, Outliers::Downweight, |problem| {
             let data = Data::new(points, y, &[]);
-            let (state, mut report) = search(problem, &data).unwrap();
+            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
             let (gp, value) = state.condition(problem, &data, &mut report).unwrap();
             (gp.mean_at(&[0.1, 0.2, 0.3]), value, gp.kernel)
         })

@@ -8,7 +8,7 @@ use crate::sample::space::{InputSpace, WarpedBox};
 use crate::sample::symmetry::Symmetry;
 
 /// The kernel coordinates of every cell's centre, stored as the factors from which they are computed. There
-/// are no such factors in [`InputSpace::PolarAngles`], where only the number of distinct cells is stored.
+/// are no such factors in an isotropic space ([`InputSpace::ISOTROPIC`]), where only the number of distinct cells is stored.
 ///
 /// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` has the coordinates `first[i]`,
 /// `min(second[l] scale(i, p), limit)` and `third[row(p)]`. In the warped box all cells of a column `(i, p)`
@@ -46,7 +46,7 @@ impl TableGeometry {
                 (theta_d.map(|t| t.powf(exponent)).collect(), limits.collect(), rows)
             }
             // v without a density says which cells are above the horizon.
-            InputSpace::PolarAngles => {
+            InputSpace::PolarAngles | InputSpace::DifferenceAngle => {
                 let limits = (0..N_THETA_H * COLUMNS).map(|k| {
                     let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
                     theta_d_max(center.theta_h, center.phi_d).recip()
@@ -64,7 +64,7 @@ impl TableGeometry {
                 let phi = (0..rows).map(|p| warped.warp_phi(cell_center(0, 0, p).phi_d));
                 (u.collect(), phi.collect())
             }
-            InputSpace::PolarAngles | InputSpace::HalfDiff => (
+            InputSpace::PolarAngles | InputSpace::DifferenceAngle | InputSpace::HalfDiff => (
                 (0..N_THETA_H).map(|i| cell_center(i, 0, 0).theta_h).collect(),
                 (0..rows).map(|p| cell_center(0, 0, p).phi_d).collect(),
             ),
