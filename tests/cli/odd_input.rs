@@ -94,7 +94,7 @@ fn any_file_name_will_do() {
     let cli = Cli::new();
     let odd = |bytes: &'static [u8]| OsStr::from_bytes(bytes);
     cli.write(odd(b"n\xFF.csv"), format!("{HEADER}10,0,20,180,1,2,3\n"));
-    cli.ok(&[odd(b"fit"), odd(b"n\xFF.csv"), odd(b"-o"), odd(b"m\xFF.safetensors")]);
+    cli.ok(&[odd(b"fit"), odd(b"n\xFF.csv"), odd(b"-o"), odd(b"m\xFF.safetensors"), odd(b"-q")]);
     let found = cli.json(&[odd(b"info"), odd(b"m\xFF.safetensors"), odd(b"--json")]);
     assert_eq!(found["details"]["samples"], 1);
     cli.ok(&[

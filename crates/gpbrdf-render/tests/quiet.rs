@@ -68,6 +68,7 @@ fn models() -> Vec<Model> {
         fitted(&lattice, FitOptions::default()),
         fitted(&lattice, FitOptions { per_channel: true, ..FitOptions::default() }),
         fitted(&scattered, FitOptions { solver: Solver::Dense, ..FitOptions::default() }),
+        fitted(&scattered, FitOptions::default()),
         compress(&table, &options, Provenance::default()).unwrap().model,
     ]
 }

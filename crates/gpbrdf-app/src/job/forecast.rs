@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use gpbrdf_core::Solver;
-use gpbrdf_core::gp::{dense_cost, scattered_seconds};
+use gpbrdf_core::gp::{dense_cost, scattered_cost};
 
 /// Evaluations of likelihood and gradient that a dense search usually takes.
 const DENSE_EVALUATIONS: usize = 40;
@@ -24,7 +24,9 @@ pub(crate) fn forecast(samples: usize, solver: Solver, per_channel: bool) -> Res
     // Each channel has a search of its own.
     let searches = if per_channel { 3.0 } else { 1.0 };
     if solver != Solver::Dense {
-        let seconds = searches * scattered_seconds(samples);
+        let cost = scattered_cost(samples);
+        cost.check()?;
+        let seconds = searches * cost.seconds;
         return Ok((seconds > LONG).then(|| format!("a fit to {samples} samples takes about {seconds:.0} s")));
     }
     let cost = dense_cost(samples, 3, DENSE_EVALUATIONS);

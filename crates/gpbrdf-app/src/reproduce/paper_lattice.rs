@@ -36,6 +36,7 @@ pub(super) fn paper_samples(truth: &BrdfTable, count: usize) -> SampleSet {
 pub(super) fn paper_options(kernel: &[Shape]) -> FitOptions {
     FitOptions {
         solver: Solver::Dense,
+        hyper_priors: false,
         transform: Transform::Identity,
         mean: MeanFunction::Zero,
         space: Some(InputSpace::HalfDiff),

@@ -80,12 +80,14 @@ pub enum Error {
         /// The last jitter tried, relative to the mean of the diagonal.
         largest_jitter: f64,
     },
-    /// A dense Gaussian process would not fit into memory.
+    /// A Gaussian process would not fit into memory.
     #[error(
-        "a dense Gaussian process on {samples} samples: expected at most {limit_gib:.1} GiB, found a need of \
-         {need_gib:.1} GiB and about {need_seconds:.0} s; take fewer samples or the lattice solver"
+        "a {solver} Gaussian process on {samples} samples: expected at most {limit_gib:.1} GiB, found a need of \
+         {need_gib:.1} GiB and about {need_seconds:.0} s; take fewer samples or another solver"
     )]
     TooLarge {
+        /// Name of the solver.
+        solver: &'static str,
         /// Number of samples.
         samples: usize,
         /// Memory it would take, in GiB.

@@ -1,6 +1,7 @@
 //! Gaussian processes: an exact one for any points, one for thousands of scattered samples, an exact one for
 //! product lattices, and a sparse one on inducing lattices.
 
+mod cost;
 mod hyper;
 #[cfg(feature = "fit")]
 mod optimize;
@@ -20,8 +21,9 @@ pub(crate) mod inducing;
 pub(crate) mod lattice;
 pub(crate) mod scattered;
 
+pub use cost::FitCost;
 pub use dense::DenseGp;
-pub use dense::cost::{DenseCost, dense_cost};
+pub use dense::cost::dense_cost;
 pub use hyper::{Hyper, HyperKind, HyperParameter};
 pub use inducing::{InducingComponent, InducingGp, InducingShape};
 pub(crate) use lattice::kronecker::apply as contract;
@@ -46,4 +48,4 @@ pub use problem::{Observer, Outliers};
 #[cfg(feature = "fit")]
 pub use report::{FitReport, Noise};
 #[cfg(feature = "fit")]
-pub use scattered::cost::scattered_seconds;
+pub use scattered::cost::scattered_cost;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use gpbrdf_core::Source;
 use gpbrdf_core::brdf::materials;
+use gpbrdf_core::{Content, Source};
 
 use super::{Event, Opened, Viewer};
 use crate::viewer::state::messages::naming;
@@ -54,6 +54,11 @@ impl Viewer {
     pub(super) fn open(&mut self, opened: Opened) {
         for notice in opened.source.notices() {
             self.context.messages.note(format!("{}: {notice}", opened.source.name));
+        }
+        if let Content::Samples(samples) = &opened.source.content {
+            for spot in samples.blind_spots() {
+                self.context.messages.note(format!("{}: {spot}", opened.source.name));
+            }
         }
         let document = self.context.documents.add(*opened.source);
         if let Some(saved) = opened.restore {

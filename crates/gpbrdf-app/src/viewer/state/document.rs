@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use eframe::egui::Color32;
-use gpbrdf_core::judge::{CellMetrics, ImageMetrics};
+use gpbrdf_core::judge::{CellMetrics, ImageMetrics, LeftOut};
 use gpbrdf_core::{Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Rgb, SampleSet, Source};
 
 use crate::job::{ModelSpec, Stage};
@@ -24,6 +24,8 @@ pub(crate) struct Fitted {
     pub(crate) log_marginal_likelihood: Option<f64>,
     /// How the search went; `None` for hyper-parameters that were set by hand.
     pub(crate) report: Option<FitReport>,
+    /// Every sample as it is predicted from all others, where the solver leaves samples out.
+    pub(crate) left_out: Option<LeftOut>,
     pub(crate) mean: Arc<BrdfTable>,
     /// Standard deviation of the latent target of each channel in every cell.
     pub(crate) sigma: Option<Arc<BrdfTable>>,

@@ -299,6 +299,7 @@ impl Observer for Follower {
                     samples: samples.unwrap_or_default(),
                     log_marginal_likelihood: fitted.log_marginal_likelihood,
                     report: fitted.reports.first().cloned(),
+                    left_out: fitted.left_out.clone(),
                     mean: Arc::clone(mean),
                     sigma: None,
                     cells: None,

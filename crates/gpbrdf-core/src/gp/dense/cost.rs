@@ -4,20 +4,9 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use super::factor::INVERSE_COLUMNS;
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::base::linalg::factorize;
-
-/// The forecast for a dense fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DenseCost {
-    /// Number of samples.
-    pub samples: usize,
-    /// Memory in bytes: the covariance matrix, `8 n^2`, and one strip of columns per thread.
-    pub bytes: f64,
-    /// Wall-clock time in seconds, from a speed that is measured once on a small matrix; it is right to
-    /// within a factor of about two.
-    pub seconds: f64,
-}
+use crate::gp::cost::{FitCost, available_bytes};
 
 /// Memory and time of one fit to `samples` samples with `channels` channels after `gradient_evaluations`
 /// evaluations of the log marginal likelihood and its gradient.
@@ -25,13 +14,13 @@ pub struct DenseCost {
 /// Conditioning takes `n^3 / 6` multiply-adds and `8 n^2` bytes; each evaluation with its gradient takes
 /// `n^3 / 2` multiply-adds.
 #[must_use]
-pub fn dense_cost(samples: usize, channels: usize, gradient_evaluations: usize) -> DenseCost {
+pub fn dense_cost(samples: usize, channels: usize, gradient_evaluations: usize) -> FitCost {
     let n = samples as f64;
     let evaluations = gradient_evaluations as f64;
     let cubic = n.powi(3) * (1.0 / 6.0 + 0.5 * evaluations) / multiply_adds_per_second();
     // Assembly, contractions and solves take a few hundred instructions per pair of samples.
     let square = n * n * (20e-9 + 1e-9 * channels as f64) * (1.0 + evaluations);
-    DenseCost { samples, bytes: bytes(samples), seconds: cubic + square }
+    FitCost { solver: "dense", samples, bytes: bytes(samples), seconds: cubic + square }
 }
 
 /// Memory of one fit to `samples` samples, in bytes.
@@ -40,49 +29,13 @@ fn bytes(samples: usize) -> f64 {
     8.0 * n * (n + (rayon::current_num_threads() * INVERSE_COLUMNS) as f64)
 }
 
-/// Refuses a fit that needs more memory than is available, as [`DenseCost::check`] does. The speed of the
+/// Refuses a fit that needs more memory than is available, as [`FitCost::check`] does. The speed of the
 /// machine, which the error message needs, is measured only in that case.
 pub(super) fn check_memory(samples: usize, channels: usize, gradient_evaluations: usize) -> Result<()> {
     if bytes(samples) <= available_bytes() {
         return Ok(());
     }
     dense_cost(samples, channels, gradient_evaluations).check()
-}
-
-impl DenseCost {
-    /// Refuses a fit that needs more memory than is available.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`] with the memory that is needed, the limit and the time.
-    pub fn check(&self) -> Result<()> {
-        self.check_against(available_bytes())
-    }
-
-    fn check_against(&self, limit: f64) -> Result<()> {
-        const GIB: f64 = 1_073_741_824.0;
-        if self.bytes <= limit {
-            return Ok(());
-        }
-        Err(Error::TooLarge {
-            samples: self.samples,
-            need_gib: self.bytes / GIB,
-            limit_gib: limit / GIB,
-            need_seconds: self.seconds,
-        })
-    }
-}
-
-/// Memory that is assumed to be available where the system does not report it: 4 GiB.
-const ASSUMED_BYTES: f64 = 4.0 * 1_073_741_824.0;
-
-/// Memory that is available without swapping, in bytes: `MemAvailable` of Linux, [`ASSUMED_BYTES`] elsewhere.
-fn available_bytes() -> f64 {
-    let parse = |text: String| {
-        let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?.trim();
-        let kib: f64 = line.strip_suffix("kB")?.trim().parse().ok()?;
-        Some(kib * 1024.0)
-    };
-    std::fs::read_to_string("/proc/meminfo").ok().and_then(parse).unwrap_or(ASSUMED_BYTES)
 }
 
 /// Speed of the Cholesky factorisation on this machine, measured with a matrix of 1024 rows. The first call
@@ -117,17 +70,5 @@ mod tests {
         assert!(cost.seconds > 0.01 && cost.seconds < 600.0, "{}", cost.seconds);
         let ratio = dense_cost(100_000, 3, 1).seconds / dense_cost(50_000, 3, 1).seconds;
         assert!(ratio > 6.0 && ratio <= 8.0, "{ratio}");
-    }
-
-    #[test]
-    fn what_does_not_fit_is_refused_with_both_figures() {
-        let cost = DenseCost { samples: 37_616, bytes: 3.0 * 1_073_741_824.0, seconds: 480.0 };
-        assert!(cost.check_against(3.5 * 1_073_741_824.0).is_ok());
-        let message = cost.check_against(2.0 * 1_073_741_824.0).unwrap_err().to_string();
-        for part in ["37616 samples", "at most 2.0 GiB", "need of 3.0 GiB", "480 s"] {
-            assert!(message.contains(part), "{message}");
-        }
-        assert!(dense_cost(100_000_000, 1, 1).check().is_err());
-        assert!(available_bytes() > 1e6);
     }
 }

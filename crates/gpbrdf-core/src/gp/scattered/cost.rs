@@ -1,9 +1,10 @@
-//! A forecast of the time of a fit to scattered samples.
+//! A forecast of the memory and the time of a fit to scattered samples.
 
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use super::product::Covariance;
+use crate::gp::cost::FitCost;
 use crate::kernel::{Kernel, Points, Shape};
 
 /// Products with the covariance that conditioning usually takes.
@@ -14,16 +15,19 @@ const PRODUCTS: f64 = 16.0;
 /// preconditioner.
 const PER_SAMPLE: f64 = 2.5e5;
 
+/// Memory of a sample: 200 inducing points twice, 48 neighbours, nine columns and their partial sums.
+const BYTES: f64 = 8.0 * (2.0 * 200.0 + 1.5 * 48.0 + 9.0 * (5.0 + 16.0));
+
 /// Time of the search itself, relative to that of a kernel value.
 const SEARCH: f64 = 8e8;
 
-/// The wall-clock time of one fit to `samples` scattered samples, in seconds, from a speed that is measured once.
-/// It is usually right to within a factor of 1.5; without noise more products are needed.
+/// Memory and time of one fit to `samples` scattered samples. The time is usually right to within a factor of 1.5;
+/// without noise more products are needed.
 #[must_use]
-pub fn scattered_seconds(samples: usize) -> f64 {
+pub fn scattered_cost(samples: usize) -> FitCost {
     let n = samples as f64;
     let values = PRODUCTS * 0.5 * n * n + PER_SAMPLE * n + SEARCH * (n / 1000.0).min(1.0);
-    values * seconds_per_value()
+    FitCost { solver: "scattered", samples, bytes: BYTES * n, seconds: values * seconds_per_value() }
 }
 
 /// Wall-clock time of one value of a Matern 5/2 kernel in a product with a covariance, measured with 2,048
@@ -53,8 +57,9 @@ mod tests {
 
     #[test]
     fn the_forecast_grows_with_the_square_in_the_end() {
-        let ratio = scattered_seconds(2_000_000) / scattered_seconds(1_000_000);
+        let ratio = scattered_cost(2_000_000).seconds / scattered_cost(1_000_000).seconds;
         assert!((3.5..=4.0).contains(&ratio), "{ratio}");
-        assert!(scattered_seconds(100) < scattered_seconds(1000));
+        assert!(scattered_cost(100_000_000).check().is_err() && scattered_cost(40_000).bytes < 1e9);
+        assert!(scattered_cost(100).seconds < scattered_cost(1000).seconds);
     }
 }

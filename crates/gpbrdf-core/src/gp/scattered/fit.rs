@@ -28,7 +28,7 @@ const MANY: usize = 24;
 const TERMS: usize = 1000;
 
 /// The largest number of iterations after neighbours or weights have changed.
-const LATER_ITERATIONS: u64 = 12;
+const LATER_ITERATIONS: u64 = 20;
 
 /// How often weights of outliers are renewed at most.
 const WEIGHT_ROUNDS: usize = 4;
@@ -130,7 +130,10 @@ pub(super) fn search(problem: &Problem<'_>, space: InputSpace, data: &Data) -> R
         if !changed && (round > 0 || n <= conditioned_on(n)) {
             break;
         }
+        let converged = found.converged;
         found = maximise(problem, data, &start, &state.kernel, &state.weights, &later)?;
+        // Later searches only follow what has changed a little.
+        found.converged |= converged;
         evaluations += found.evaluations;
     }
     state.noise_variance = start.set(&mut state.kernel, &found.log_parameters)?;

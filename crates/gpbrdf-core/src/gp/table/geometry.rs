@@ -8,7 +8,8 @@ use crate::sample::space::{InputSpace, WarpedBox};
 use crate::sample::symmetry::Symmetry;
 
 /// The kernel coordinates of every cell's centre, stored as the factors from which they are computed. There
-/// are no such factors in an isotropic space ([`InputSpace::ISOTROPIC`]), where only the number of distinct cells is stored.
+/// are no such factors in an isotropic space ([`InputSpace::ISOTROPIC`]), where only the number of distinct
+/// cells is of use.
 ///
 /// Cell `(i, l, p)` along `(theta_h, theta_d, phi_d)` has the coordinates `first[i]`,
 /// `min(second[l] scale(i, p), limit)` and `third[row(p)]`. In the warped box all cells of a column `(i, p)`

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
+use gpbrdf_core::judge::LeftOut;
 use gpbrdf_core::{LatticeLayout, MeanFunction, Shape, Symmetry};
 
 use crate::job::{
@@ -21,7 +22,7 @@ const OPTIMISE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::O
 
 /// The largest numbers of samples on a lattice and of scattered samples.
 const MAX_LATTICE: f64 = 200_000.0;
-const MAX_DENSE: f64 = 4000.0;
+const MAX_SCATTERED: f64 = 20_000.0;
 
 /// What is wanted of the work on a model.
 enum Click {
@@ -157,7 +158,7 @@ fn layout_ui(ui: &mut Ui, spec: &mut ModelSpec) {
         choice_ui(ui, "Symmetry", &mut spec.symmetry, &SymmetryChoice::ALL, SymmetryChoice::label);
     } else {
         let mut count = spec.count() as f64;
-        let mut number = Number::new("Samples", 20.0..=MAX_DENSE, 800.0, help);
+        let mut number = Number::new("Samples", 20.0..=MAX_SCATTERED, 800.0, help);
         (number.logarithmic, number.whole) = (true, true);
         if number.row_ui(ui, &mut count) {
             spec.samples = Some(whole(count));
@@ -289,6 +290,38 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
     click
 }
 
+/// What a fit says about its own samples. `line` shows a name, a value and an explanation.
+fn left_out_ui(line: &dyn Fn(&mut Ui, &str, String, &str), ui: &mut Ui, left_out: &LeftOut) {
+    let m = &left_out.metrics;
+    line(
+        ui,
+        "Left out",
+        format!("{} %, {:.1} % covered", short(100.0 * m.median_abs_log), 100.0 * m.coverage_95),
+        "Every sample as it is predicted from all others: median of |ln(prediction + 0.001) - ln(value + 0.001)|, \
+         and the share of the samples in their 95 % interval",
+    );
+    let outliers = &left_out.outliers;
+    if outliers.is_empty() {
+        return;
+    }
+    let mut places: Vec<String> = outliers
+        .iter()
+        .take(LISTED)
+        .map(|outlier| match outlier.line {
+            Some(line) => format!("line {line}"),
+            None => format!("sample {}", outlier.sample + 1),
+        })
+        .collect();
+    if outliers.len() > LISTED {
+        places.push(format!("and {} more", outliers.len() - LISTED));
+    }
+    let help = format!("Suspected outliers, which were given a larger noise: {}", places.join(", "));
+    line(ui, "Outliers", outliers.len().to_string(), &help);
+}
+
+/// The largest number of outliers that are named.
+const LISTED: usize = 20;
+
 fn metrics_ui(ui: &mut Ui, document: &Document) {
     let Some(fitted) = &document.fitted else {
         ui.weak("None yet");
@@ -318,6 +351,9 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
         if !report.at_bound.is_empty() {
             line(ui, "At a bound", report.at_bound.join(", "), "Hyper-parameters at the end of their range");
         }
+    }
+    if let Some(left_out) = &fitted.left_out {
+        left_out_ui(&line, ui, left_out);
     }
     if document.source_is_truth() {
         let images = fitted.images.as_ref();
