@@ -49,3 +49,5 @@ pub use problem::{Observer, Outliers};
 pub use report::{FitReport, Noise};
 #[cfg(feature = "fit")]
 pub use scattered::cost::scattered_cost;
+#[cfg(feature = "fit")]
+pub use search::UsualValues;

@@ -16,6 +16,15 @@ const VARIANCE_DEVIATION: f64 = 1.2;
 /// The prior of the mixture parameter of a rational quadratic kernel.
 const ALPHA_PRIOR: (f64, f64) = (1.0, 1.5);
 
+/// What hyper-parameters usually are: the medians of weak log-normal priors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UsualValues {
+    /// The length scale along each coordinate, and the standard deviation of its logarithm.
+    pub lengths: [(f64, f64); 3],
+    /// The variance of targets; `None` where only the targets tell.
+    pub variance: Option<f64>,
+}
+
 /// A kernel that is a sum of ARD kernels, and the parameters of a search: the kernel's and, where it is
 /// optimised, the noise variance.
 #[derive(Clone, Debug)]

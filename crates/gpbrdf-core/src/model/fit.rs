@@ -120,11 +120,11 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
         return Err(Error::argument("kernel", "at least one shape", "none"));
     }
     options.kernel.iter().flatten().try_for_each(|shape| shape.validate())?;
-    let channels: &[std::ops::Range<usize>] = if options.per_channel { &[0..1, 1..2, 2..3] } else { &[0..3] };
+    let groups: &[&[usize]] = if options.per_channel { &[&[0], &[1], &[2]] } else { &[&[0, 1, 2]] };
     let watch = Watch::new(&options.observer);
-    let fitted = channels.iter().map(|channels| {
-        let noise = known_noise(samples, options.transform, channels.clone());
-        let targets = targets[channels.clone()].to_vec();
+    let fitted = groups.iter().map(|channels| {
+        let noise = known_noise(samples, options.transform, channels);
+        let targets = channels.iter().map(|&c| targets[c].clone()).collect();
         options.solver.fit(&options.problem(samples, targets, &noise, &watch))
     });
     let (posteriors, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
@@ -145,7 +145,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
 pub fn condition(samples: &SampleSet, options: &FitOptions, hyper: &Hyper) -> Result<Conditioned> {
     let (targets, offsets) = targets(samples, options)?;
     let watch = Watch::new(&options.observer);
-    let noise = known_noise(samples, options.transform, 0..3);
+    let noise = known_noise(samples, options.transform, &[0, 1, 2]);
     let (posterior, log_marginal_likelihood) =
         Solver::condition(&options.problem(samples, targets, &noise, &watch), hyper)?;
     let origin = samples.origin.clone();
@@ -182,15 +182,15 @@ fn targets(samples: &SampleSet, options: &FitOptions) -> Result<(Vec<Vec<f64>>, 
 
 /// The noise variance of each sample that its given standard deviation leads to, in squared target units and as
 /// a mean over the channels: `(sigma dg/df)^2`. Empty if the samples have no standard deviations.
-fn known_noise(samples: &SampleSet, transform: Transform, channels: std::ops::Range<usize>) -> Vec<f64> {
+fn known_noise(samples: &SampleSet, transform: Transform, channels: &[usize]) -> Vec<f64> {
     let variance = |(value, sigma): (&Rgb, &Rgb)| {
         let count = channels.len() as f64;
-        let square = |c: usize| {
+        let square = |&c: &usize| {
             let slope = transform.slope_of_inverse(transform.forward(value[c]));
             // A root has no slope at zero.
             (sigma[c] / slope.max(f64::MIN_POSITIVE)).min(LARGEST_DEVIATION).powi(2)
         };
-        channels.clone().map(square).sum::<f64>() / count
+        channels.iter().map(square).sum::<f64>() / count
     };
     samples.values.iter().zip(&samples.sigma).map(variance).collect()
 }

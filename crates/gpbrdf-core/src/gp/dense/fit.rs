@@ -4,7 +4,7 @@ use crate::base::error::{Error, Result};
 use crate::base::random::golden_ratio_subset;
 use crate::gp::dense::{DenseEvaluator, DenseGp};
 use crate::gp::report::{FitReport, Noise};
-use crate::gp::search::{SearchStart, extent};
+use crate::gp::search::{SearchStart, UsualValues, extent};
 use crate::gp::{OptimizeOptions, Optimum, maximize};
 use crate::kernel::{AxisMetric, Shape};
 
@@ -22,9 +22,8 @@ pub struct DenseFit<'a> {
     pub shapes: &'a [Shape],
     /// The rule for the noise variance.
     pub noise: Noise,
-    /// For weak priors of the hyper-parameters, the usual length scale along each coordinate with the deviation
-    /// of its logarithm, and the usual variance of targets if it is known; `None` for maximum likelihood.
-    pub priors: Option<([(f64, f64); 3], Option<f64>)>,
+    /// Weak priors of the hyper-parameters; `None` for maximum likelihood.
+    pub priors: Option<UsualValues>,
     /// Settings of the search.
     pub options: &'a OptimizeOptions,
 }
@@ -56,13 +55,13 @@ impl DenseFit<'_> {
         shapes.iter().try_for_each(|shape| shape.validate())?;
         let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
         let data = Data { x, y: &y, dimension: metrics.len(), channels };
-        let usual_variance = priors.and_then(|(_, variance)| variance);
+        let usual_variance = priors.and_then(|usual| usual.variance);
         let made = |data: &Data<'_>| {
             let extents: Vec<f64> =
                 (0..data.dimension).map(|k| extent(data.x, data.dimension, k, metrics[k])).collect();
             let start =
                 SearchStart::new((data.y, usual_variance), data.channels, &extents, metrics, shapes, noise);
-            priors.map_or(start.clone(), |(lengths, _)| start.with_priors(lengths))
+            priors.map_or(start.clone(), |usual| start.with_priors(usual.lengths))
         };
         let mut problem = made(&data);
         let mut scouting = 0;

@@ -9,6 +9,7 @@ use crate::base::error::Result;
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{Fitted, Problem};
+use crate::gp::search::UsualValues;
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::space::InputSpace;
 
@@ -23,7 +24,9 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
         metrics: &space.metrics(),
         shapes: &problem.kernel[0],
         noise: problem.noise,
-        priors: problem.priors.then(|| (space.usual_lengths(), problem.usual_variance)),
+        priors: problem
+            .priors
+            .then(|| UsualValues { lengths: space.usual_lengths(), variance: problem.usual_variance }),
         options: problem.optimize,
     };
     let (gp, report) = search.run(&|| problem.watch.evaluation())?;

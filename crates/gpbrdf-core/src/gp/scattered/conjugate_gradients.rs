@@ -38,7 +38,7 @@ pub(super) struct Solution {
 /// is `ln det M + tr ln(M^-1 K)`; its second part is a mean over samples `z` of the process with covariance `M`,
 /// which are further right-hand sides: the coefficients of their searches are those of the Lanczos process, and
 /// `z^T M^-1 z (e_1^T ln(T) e_1)` with its tridiagonal matrix `T` is the quadrature. Source: J. R. Gardner et
-/// al., "GPyTorch: Blackbox Matrix-Matrix Gaussian Process Inference with GPU Acceleration" (2018), section 4.
+/// al., "`GPyTorch`: Blackbox Matrix-Matrix Gaussian Process Inference with GPU Acceleration" (2018), section 4.
 ///
 /// # Errors
 /// A residual that is still above 1e-2 after 400 products, and the errors of `watch`.
