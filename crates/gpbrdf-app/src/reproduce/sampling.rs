@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use gpbrdf_core::brdf::N_CELLS;
-use gpbrdf_core::{FitOptions, Layout, SampleSet, Solver};
+use gpbrdf_core::{FitOptions, LatticeLayout, Layout, SampleSet, Solver};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
@@ -51,7 +51,11 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
                 (material.lattice_samples(count)?, FitOptions::default())
             } else {
                 let samples = SampleSet::measure(&*truth, &Layout::Cells { count, seed: 0 })?;
-                (samples, FitOptions { solver: Solver::Dense, ..FitOptions::default() })
+                // The same space and the same rule as on the lattice: only the layout differs.
+                let space = Some(LatticeLayout::default().space().into());
+                let options =
+                    FitOptions { solver: Solver::Dense, hyper_priors: false, space, ..FitOptions::default() };
+                (samples, options)
             };
             let fitted = context.fit_and_compare(&truth, &samples, &options, false)?;
             let n = samples.angles.len();

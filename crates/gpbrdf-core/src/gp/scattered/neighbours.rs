@@ -181,7 +181,7 @@ fn length_scales(kernel: &Kernel) -> Vec<f64> {
     lengths
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fit"))]
 mod tests {
     use super::*;
     use crate::kernel::test_kernels;
