@@ -99,72 +99,101 @@ fn conditioned_on(n: usize) -> usize {
     if n <= FEW.0 { FEW.1 } else { MANY }
 }
 
-/// Finds hyper-parameters and weights.
-pub(super) fn search(problem: &Problem<'_>, space: InputSpace, data: &Data) -> Result<(State, FitReport)> {
-    let metrics = space.metrics();
-    let n = data.len();
-    let extents: Vec<f64> = (0..3).map(|k| extent(&data.x, 3, k, metrics[k])).collect();
-    let start = SearchStart::new(
-        (&data.y.concat(), problem.usual_variance.filter(|_| problem.priors)),
-        data.y.len(),
-        &extents,
-        &metrics,
-        &problem.kernel[0],
-        problem.noise,
-    );
-    let mut start = if problem.priors { start.with_priors(space.usual_lengths()) } else { start };
-    let mut evaluations = 0;
-    let mut state = State { kernel: start.kernel.clone(), noise_variance: 0.0, weights: vec![1.0; n] };
-    let mut found = maximise(problem, data, &start, &state.kernel, &state.weights, problem.optimize)?;
-    evaluations += found.evaluations;
-    let later = OptimizeOptions {
-        restarts: 0,
-        max_iterations: LATER_ITERATIONS.min(problem.optimize.max_iterations),
-        ..*problem.optimize
-    };
-    for round in 0..WEIGHT_ROUNDS {
-        start.start_from(&found.log_parameters);
-        state.noise_variance = start.set(&mut state.kernel, &found.log_parameters)?;
-        let changed = problem.outliers == Outliers::Downweight && state.renew_weights(data);
-        // Neighbours are those of the length scales that were found; weights are renewed until they stay.
-        if !changed && (round > 0 || n <= conditioned_on(n)) {
-            break;
-        }
-        let converged = found.converged;
-        found = maximise(problem, data, &start, &state.kernel, &state.weights, &later)?;
-        // Later searches only follow what has changed a little.
-        found.converged |= converged;
-        evaluations += found.evaluations;
-    }
-    state.noise_variance = start.set(&mut state.kernel, &found.log_parameters)?;
-    let report = FitReport {
-        log_marginal_likelihood: found.value - found.log_prior,
-        evaluations,
-        converged: found.converged,
-        at_bound: found.at_bound,
-        ..FitReport::default()
-    };
-    Ok((state, report))
+/// A search for hyper-parameters and weights in one space.
+pub(super) struct Search<'a> {
+    problem: &'a Problem<'a>,
+    start: SearchStart,
+    found: Optimum,
+    state: State,
+    pub(super) data: Data,
+    pub(super) space: InputSpace,
+    pub(super) evaluations: usize,
 }
 
-/// Maximises the likelihood, with neighbours in the metric of `kernel`.
+impl<'a> Search<'a> {
+    /// Finds hyper-parameters with all samples of weight 1 and with neighbours in the metric of the start.
+    pub(super) fn begin(problem: &'a Problem<'a>, space: InputSpace, data: Data) -> Result<Self> {
+        let metrics = space.metrics();
+        let extents: Vec<f64> = (0..3).map(|k| extent(&data.x, 3, k, metrics[k])).collect();
+        let start = SearchStart::new(
+            (&data.y.concat(), problem.usual_variance.filter(|_| problem.priors)),
+            data.y.len(),
+            &extents,
+            &metrics,
+            &problem.kernel[0],
+            problem.noise,
+        );
+        let start = if problem.priors { start.with_priors(space.usual_lengths()) } else { start };
+        let state =
+            State { kernel: start.kernel.clone(), noise_variance: 0.0, weights: vec![1.0; data.len()] };
+        let found = maximise(problem, &data, &start, &state, problem.optimize)?;
+        let evaluations = found.evaluations;
+        Ok(Self { problem, start, found, state, data, space, evaluations })
+    }
+
+    /// The log marginal likelihood so far.
+    pub(super) fn value(&self) -> f64 {
+        self.found.value - self.found.log_prior
+    }
+
+    /// Follows the optimum while neighbours and weights change with it.
+    pub(super) fn finish(mut self) -> Result<(Data, State, FitReport)> {
+        let n = self.data.len();
+        let later = OptimizeOptions {
+            restarts: 0,
+            max_iterations: LATER_ITERATIONS.min(self.problem.optimize.max_iterations),
+            ..*self.problem.optimize
+        };
+        for round in 0..WEIGHT_ROUNDS {
+            self.take_optimum()?;
+            let changed =
+                self.problem.outliers == Outliers::Downweight && self.state.renew_weights(&self.data);
+            // Neighbours are those of the length scales that were found; weights are renewed until they stay.
+            if !changed && (round > 0 || n <= conditioned_on(n)) {
+                break;
+            }
+            let converged = self.found.converged;
+            self.found = maximise(self.problem, &self.data, &self.start, &self.state, &later)?;
+            // Later searches only follow what has changed a little.
+            self.found.converged |= converged;
+            self.evaluations += self.found.evaluations;
+        }
+        self.take_optimum()?;
+        let report = FitReport {
+            log_marginal_likelihood: self.value(),
+            evaluations: self.evaluations,
+            converged: self.found.converged,
+            at_bound: self.found.at_bound,
+            ..FitReport::default()
+        };
+        Ok((self.data, self.state, report))
+    }
+
+    /// Goes on from the hyper-parameters that were found.
+    fn take_optimum(&mut self) -> Result<()> {
+        self.start.start_from(&self.found.log_parameters);
+        self.state.noise_variance = self.start.set(&mut self.state.kernel, &self.found.log_parameters)?;
+        Ok(())
+    }
+}
+
+/// Maximises the likelihood, with the weights of a state and neighbours in the metric of its kernel.
 fn maximise(
     problem: &Problem<'_>,
     data: &Data,
     start: &SearchStart,
-    kernel: &Kernel,
-    weights: &[f64],
+    state: &State,
     options: &OptimizeOptions,
 ) -> Result<Optimum> {
     let n = data.len();
-    let neighbours = Embedded::new(&data.x, kernel).nearest_before(conditioned_on(n));
+    let neighbours = Embedded::new(&data.x, &state.kernel).nearest_before(conditioned_on(n));
     let subset = evenly(n, TERMS);
     let scale = n as f64 / subset.len() as f64;
-    let mut kernel = kernel.clone();
+    let mut kernel = state.kernel.clone();
     maximize(&start.parameters, n * data.y.len(), options, |p| {
         problem.watch.evaluation()?;
         let noise_variance = start.set(&mut kernel, p)?;
-        let (shared, all) = data.noise(noise_variance, weights);
+        let (shared, all) = data.noise(noise_variance, &state.weights);
         let process = Process { kernel: &kernel, x: &data.x, noise: &all };
         let targets = Targets { y: &data.y, shared_noise: &shared };
         let (value, mut gradient) = log_likelihood(&process, &targets, &neighbours, &subset);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::fit::{Data, State, search};
+use super::fit::{Data, Search, State};
 use super::posterior::ScatteredPosterior;
 use crate::base::error::{Error, Result};
 use crate::gp::hyper::Hyper;
@@ -11,8 +11,8 @@ use crate::gp::problem::{Fitted, Problem};
 use crate::gp::report::{FitReport, Noise};
 use crate::sample::space::InputSpace;
 
-/// Finds hyper-parameters in each of the spaces to choose from and conditions the process at those of the largest
-/// likelihood. The kernels measure the joint distance, so only the shapes of the first axis are used.
+/// Finds hyper-parameters in each of the spaces to choose from, follows those of the largest likelihood while
+/// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance, so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     if let Noise::Fixed(variance) = problem.noise
         && !(variance > 0.0 && variance.is_finite())
@@ -21,24 +21,23 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     }
     let spaces = problem.space.map_or(InputSpace::ISOTROPIC.to_vec(), |space| vec![space]);
     let mut evaluations = 0;
-    let mut best: Option<(InputSpace, Data, State, FitReport)> = None;
+    let mut best: Option<Search<'_>> = None;
     for space in spaces {
-        let data = data(problem, space)?;
-        let (state, report) = search(problem, space, &data)?;
-        evaluations += report.evaluations;
-        let ahead = |(.., known): &(InputSpace, Data, State, FitReport)| {
-            known.log_marginal_likelihood < report.log_marginal_likelihood
-        };
-        if best.as_ref().is_none_or(ahead) {
-            best = Some((space, data, state, report));
+        let search = Search::begin(problem, space, data(problem, space)?)?;
+        evaluations += search.evaluations;
+        if best.as_ref().is_none_or(|known| known.value() < search.value()) {
+            best = Some(search);
         }
     }
-    let Some((space, data, state, mut report)) = best else {
+    let Some(best) = best else {
         return Err(Error::argument("input spaces", "at least one", "none"));
     };
+    evaluations -= best.evaluations;
+    let space = best.space;
+    let (data, state, mut report) = best.finish()?;
     let (gp, value) = state.condition(problem, &data, &mut report)?;
     report.log_marginal_likelihood = value;
-    report.evaluations = evaluations;
+    report.evaluations += evaluations;
     Ok((Arc::new(ScatteredPosterior { gp, space }), report))
 }
 

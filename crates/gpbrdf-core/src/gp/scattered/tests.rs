@@ -1,5 +1,5 @@
 use super::conditional::Process;
-use super::fit::{Data, State, search};
+use super::fit::{Data, Search, State};
 use super::neighbours::Embedded;
 use super::vecchia::{Targets, log_likelihood};
 use super::*;
@@ -133,7 +133,8 @@ fn four_thousand_samples_agree_with_the_dense_process() {
             .collect();
         let (gp, value) = with_problem(&y, Outliers::Keep, |problem| {
             let data = Data::new(&points, &y, &[]);
-            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
+            let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
+            let (data, state, mut report) = search.finish().unwrap();
             state.condition(problem, &data, &mut report).unwrap()
         });
         let (kernel, own) = (gp.kernel.clone(), gp.noise_variance);
@@ -211,7 +212,8 @@ fn outliers_are_found_and_nothing_else() {
     let fit = |outliers| {
         with_problem(&y, outliers, |problem| {
             let data = Data::new(&points, &y, &[]);
-            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
+            let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
+            let (data, state, mut report) = search.finish().unwrap();
             let (gp, _) = state.condition(problem, &data, &mut report).unwrap();
             (gp.noise_variance.sqrt(), report)
         })
@@ -232,7 +234,8 @@ fn the_order_of_samples_changes_no_bit() {
     let fit = |points: &[[f64; 3]], y: &[Vec<f64>]| {
         with_problem(y, Outliers::Downweight, |problem| {
             let data = Data::new(points, y, &[]);
-            let (state, mut report) = search(problem, InputSpace::PolarAngles, &data).unwrap();
+            let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
+            let (data, state, mut report) = search.finish().unwrap();
             let (gp, value) = state.condition(problem, &data, &mut report).unwrap();
             (gp.mean_at(&[0.1, 0.2, 0.3]), value, gp.kernel)
         })
