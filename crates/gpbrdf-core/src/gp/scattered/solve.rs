@@ -12,7 +12,8 @@ use crate::gp::report::{FitReport, Noise};
 use crate::sample::space::InputSpace;
 
 /// Finds hyper-parameters in each of the spaces to choose from, follows those of the largest likelihood while
-/// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance, so only the shapes of the first axis are used.
+/// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance,
+/// so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     if let Noise::Fixed(variance) = problem.noise
         && !(variance > 0.0 && variance.is_finite())
