@@ -31,6 +31,7 @@ struct LowRank {
 }
 
 impl LowRank {
+    /// The part of the first samples of the order; of none where their covariance cannot be factorised.
     fn new(kernel: &Kernel, x: &[f64], n: usize) -> Self {
         let mut rank = (n / SAMPLES_PER_POINT).min(MOST_POINTS);
         let dimension = kernel.dimension();
@@ -115,7 +116,8 @@ impl FarField {
         if low_rank.rank > 0 {
             solve_lower(&self.capacitance, low_rank.rank, &mut known);
         }
-        rest.max(0.0) + dot(&known, &known)
+        // Rounding must not make anything less certain than it was before.
+        (rest.max(0.0) + dot(&known, &known)).min(process.kernel.prior_variance())
     }
 }
 
