@@ -131,13 +131,15 @@ fn left_out_lines(left_out: &LeftOut) -> Vec<String> {
             if outliers.len() == 1 { " was" } else { "s were" }
         ));
         lines.extend(outliers.iter().take(LISTED).map(|outlier| {
-            let place = match outlier.line {
-                Some(line) => format!("line {line}"),
-                None => format!("sample {}", outlier.sample + 1),
-            };
             let list = |rgb: [f64; 3]| rgb.map(|v| significant(v, 4)).join(" ");
             let [lower, upper] = outlier.expected;
-            format!("    {place}: {}, expected {} to {}", list(outlier.value), list(lower), list(upper))
+            format!(
+                "    {}: {}, expected {} to {}",
+                outlier.place(),
+                list(outlier.value),
+                list(lower),
+                list(upper)
+            )
         }));
         if outliers.len() > LISTED {
             lines.push(format!("    and {} more (--json lists all)", outliers.len() - LISTED));

@@ -1,6 +1,7 @@
 //! Hyper-parameters, in one form for every solver.
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use crate::base::error::{Error, Result};
 use crate::gp::solver::Solver;
@@ -25,6 +26,19 @@ pub struct Hyper {
     /// The input space of the kernel, where a solver has chosen it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub space: Option<InputSpace>,
+}
+
+/// The length scales of a kernel as JSON for reports: of its only term, or a list with those of each.
+pub(crate) fn length_scale_report(kernel: &Kernel) -> Value {
+    let mut lengths: Vec<Value> = kernel
+        .terms
+        .iter()
+        .map(|term| match &term.body {
+            KernelBody::Ard { length_scale, .. } => json!(length_scale),
+            KernelBody::Product(axes) => json!(axes),
+        })
+        .collect();
+    if lengths.len() == 1 { lengths.remove(0) } else { Value::Array(lengths) }
 }
 
 /// The role of a hyper-parameter.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::base::error::{Error, Result};
 use crate::gp::LeaveOneOut;
 
 /// The rule for the noise variance.
@@ -13,6 +14,21 @@ pub enum Noise {
     Optimized,
     /// The noise variance is held at this value, in squared target units.
     Fixed(f64),
+}
+
+impl Noise {
+    /// Checks a fixed variance.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for one that is not positive and finite.
+    pub(crate) fn validate(self) -> Result<()> {
+        match self {
+            Self::Fixed(variance) if !(variance > 0.0 && variance.is_finite()) => {
+                Err(Error::argument("noise variance", "a positive number", variance))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// The outcome of a search for hyper-parameters.

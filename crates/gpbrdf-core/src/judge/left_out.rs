@@ -31,6 +31,17 @@ pub struct Outlier {
     pub expected: [Rgb; 2],
 }
 
+impl Outlier {
+    /// Where it is, for people: `line 17`, or `sample 17` counted from 1 where there is no file.
+    #[must_use]
+    pub fn place(&self) -> String {
+        match self.line {
+            Some(line) => format!("line {line}"),
+            None => format!("sample {}", self.sample + 1),
+        }
+    }
+}
+
 impl LeftOut {
     /// What a fit to `samples` says about them; `None` where its solver leaves no sample out.
     ///

@@ -3,9 +3,11 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::axis::Kernel1d;
 use super::composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
-use crate::base::simd::{add_scaled, multiply, scale_in_place, scale_into, vectorized};
+use crate::base::simd::{add_scaled, dot, multiply, scale_in_place, scale_into, vectorized};
 
 /// Number of points of a strip.
 pub(super) const STRIP: usize = 512;
@@ -126,7 +128,30 @@ impl RowScratch {
     }
 }
 
+/// Number of points whose kernel sums one parallel task computes.
+const SUM_BLOCK: usize = 128;
+
 impl Kernel {
+    /// `sum_i weights_ic k(x_j, points_i)` at every point `x_j` of `at`: rows with one value per channel.
+    /// `weights` has one column of the length of `points` per channel. Cost: one kernel value for each pair.
+    pub(crate) fn weighted_sums(&self, points: &Points, weights: &[f64], at: &Points) -> Vec<f64> {
+        let n = points.len();
+        let channels = weights.len() / n;
+        let mut out = vec![0.0; at.len() * channels];
+        out.par_chunks_mut(SUM_BLOCK * channels).enumerate().for_each_init(
+            || (RowScratch::new(self.dimension()), vec![0.0; n]),
+            |(scratch, row), (block, out)| {
+                for (out, j) in out.chunks_mut(channels).zip(block * SUM_BLOCK..) {
+                    self.row(points, 0..n, at, j, scratch, row);
+                    for (out, weights) in out.iter_mut().zip(weights.chunks(n)) {
+                        *out = dot(row, weights);
+                    }
+                }
+            },
+        );
+        out
+    }
+
     /// `out[i] = k(points[rows.start + i], other[j])`; `out` has the length of `rows`.
     pub(crate) fn row(
         &self,

@@ -47,11 +47,7 @@ impl DenseFit<'_> {
         if channels == 0 || targets.iter().any(|t| t.len() != n) {
             return Err(Error::argument("dense targets", "channels of one length, at least one", channels));
         }
-        if let Noise::Fixed(variance) = noise
-            && !(variance > 0.0 && variance.is_finite())
-        {
-            return Err(Error::argument("noise variance", "a positive number", variance));
-        }
+        noise.validate()?;
         shapes.iter().try_for_each(|shape| shape.validate())?;
         let y: Vec<f64> = (0..n).flat_map(|i| targets.iter().map(move |t| t[i])).collect();
         let data = Data { x, y: &y, dimension: metrics.len(), channels };

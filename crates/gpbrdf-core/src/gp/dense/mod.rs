@@ -213,21 +213,7 @@ impl DenseGp {
     /// [`DenseGp::predict_mean`] without its checks: `x` must hold whole rows, and coordinates that are not
     /// finite give NaN.
     pub(crate) fn mean_at(&self, x: &[f64]) -> Vec<f64> {
-        let test = Points::new(x, &self.kernel.metric);
-        let n = self.points.len();
-        let mut out = vec![0.0; test.len() * self.channels];
-        out.par_chunks_mut(TEST_BLOCK * self.channels).enumerate().for_each_init(
-            || (RowScratch::new(self.kernel.dimension()), vec![0.0; n]),
-            |(scratch, row), (block, out)| {
-                for (out, j) in out.chunks_mut(self.channels).zip(block * TEST_BLOCK..) {
-                    self.kernel.row(&self.points, 0..n, &test, j, scratch, row);
-                    for (out, alpha) in out.iter_mut().zip(self.alpha.chunks(n)) {
-                        *out = dot(row, alpha);
-                    }
-                }
-            },
-        );
-        out
+        self.kernel.weighted_sums(&self.points, &self.alpha, &Points::new(x, &self.kernel.metric))
     }
 
     /// Posterior variance of the noise-free function at `x`, which has `m` rows of coordinates. The result
@@ -306,7 +292,7 @@ fn column_major(rows: &[f64], channels: usize) -> Vec<f64> {
 }
 
 /// The inverse of [`column_major`].
-fn row_major(columns: &[f64], channels: usize) -> Vec<f64> {
+pub(crate) fn row_major(columns: &[f64], channels: usize) -> Vec<f64> {
     column_major(columns, columns.len() / channels)
 }
 

@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::DenseGp;
 use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
-use crate::gp::hyper::Hyper;
+use crate::gp::hyper::{Hyper, length_scale_report};
 use crate::gp::posterior::{DeviceForm, KernelSum, Posterior};
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
-use crate::kernel::{Kernel, KernelBody};
+use crate::kernel::Kernel;
 use crate::sample::space::InputSpace;
 
 /// The solver's name in files and reports.
@@ -100,13 +100,8 @@ impl Posterior for DensePosterior {
     }
 
     fn report(&self) -> Value {
-        let lengths = self.gp.kernel().terms.iter().map(|term| match &term.body {
-            KernelBody::Ard { length_scale, .. } => json!(length_scale),
-            KernelBody::Product(axes) => json!(axes),
-        });
-        let mut lengths: Vec<Value> = lengths.collect();
         json!({
-            "length_scale": if lengths.len() == 1 { lengths.remove(0) } else { Value::Array(lengths) },
+            "length_scale": length_scale_report(self.gp.kernel()),
             "signal_variance": self.gp.kernel().prior_variance(),
             "noise_variance": self.gp.noise_variance(),
             "jitter": self.gp.jitter(),

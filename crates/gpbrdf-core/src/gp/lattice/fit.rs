@@ -1,6 +1,6 @@
 //! The search for the hyper-parameters of the lattice process, by maximum marginal likelihood.
 
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::gp::hyper::{AXIS_NAMES, MIN_NOISE_RATIO};
 use crate::gp::lattice::{LatticeData, LatticeGp, LatticeHyper};
 use crate::gp::report::{FitReport, Noise};
@@ -26,11 +26,7 @@ pub fn fit_lattice(
 ) -> Result<(LatticeGp, FitReport)> {
     data.validate()?;
     kernels.iter().try_for_each(Kernel1d::validate)?;
-    if let Noise::Fixed(variance) = noise
-        && !(variance > 0.0 && variance.is_finite())
-    {
-        return Err(Error::argument("noise variance", "a positive number", variance));
-    }
+    noise.validate()?;
     let variance = data.targets.iter().map(|y| y * y).sum::<f64>() / data.targets.len() as f64;
     let mut problem = Problem { kernels: kernels.clone(), noise };
     let mut parameters = problem.parameters(&data, variance.max(1e-12));

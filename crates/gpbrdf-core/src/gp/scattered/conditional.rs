@@ -29,6 +29,11 @@ impl Process<'_> {
         self.kernel.value(self.point(i), self.point(j))
     }
 
+    /// The least variance of a measurement of sample `i`, whatever is known.
+    pub(super) fn least_variance(&self, i: usize) -> f64 {
+        self.noise[i].max(JITTER * self.kernel.prior_variance())
+    }
+
     /// Variance of a measurement of sample `i` before anything is known.
     #[cfg(feature = "fit")]
     pub(super) fn diagonal(&self, i: usize) -> f64 {

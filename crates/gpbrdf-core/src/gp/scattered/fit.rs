@@ -270,14 +270,8 @@ impl State {
         changed
     }
 
-    /// Conditions the process. The second value is the log likelihood over all samples.
-    pub(super) fn condition(
-        self,
-        problem: &Problem<'_>,
-        data: &Data,
-        report: &mut FitReport,
-    ) -> Result<(ScatteredGp, f64)> {
-        let n = data.len();
+    /// Adds what the samples say about themselves to a report: predictions from all others, and weights.
+    pub(super) fn report_samples(&self, data: &Data, report: &mut FitReport) {
         let (residuals, variances, _) = self.leave_one_out(data);
         let density = residuals.chunks(data.y.len()).zip(&variances).map(|(row, v)| {
             row.iter().map(|r| -0.5 * ((std::f64::consts::TAU * v).ln() + r * r / v)).sum::<f64>()
@@ -290,6 +284,11 @@ impl State {
         if self.weights.iter().any(|&w| w != 1.0) {
             report.weights = data.as_given(&self.weights, 1);
         }
+    }
+
+    /// Conditions the process. The second value is the log likelihood over all samples.
+    pub(super) fn condition(self, problem: &Problem<'_>, data: &Data) -> Result<(ScatteredGp, f64)> {
+        let n = data.len();
         let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(NEAREST);
         let (_, all) = data.noise(self.noise_variance, &self.weights);
         let process = Process { kernel: &self.kernel, x: &data.x, noise: &all };

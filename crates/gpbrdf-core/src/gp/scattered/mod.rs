@@ -30,11 +30,7 @@ use self::conditional::{Process, Scratch};
 use self::neighbours::Embedded;
 use self::preconditioner::{FarField, Preconditioner};
 use crate::base::error::{Error, Result};
-use crate::base::simd::dot;
-use crate::kernel::{Kernel, Points, RowScratch};
-
-/// Number of points that one parallel task predicts.
-const BLOCK: usize = 64;
+use crate::kernel::{Kernel, Points};
 
 /// The number of nearest samples on which variances, leave-one-out predictions and the preconditioner are
 /// conditioned. All samples are taken where there are no more than these.
@@ -109,21 +105,7 @@ impl ScatteredGp {
     /// Posterior mean at `x`, rows of coordinates; rows with one value per channel. Cost: `n` kernel
     /// evaluations per point.
     pub(crate) fn mean_at(&self, x: &[f64]) -> Vec<f64> {
-        let test = Points::new(x, &self.kernel.metric);
-        let n = self.n_samples();
-        let mut out = vec![0.0; test.len() * self.channels];
-        out.par_chunks_mut(BLOCK * self.channels).enumerate().for_each_init(
-            || (RowScratch::new(self.kernel.dimension()), vec![0.0; n]),
-            |(scratch, row), (block, out)| {
-                for (out, j) in out.chunks_mut(self.channels).zip(block * BLOCK..) {
-                    self.kernel.row(&self.points, 0..n, &test, j, scratch, row);
-                    for (out, weights) in out.iter_mut().zip(self.weights.chunks(n)) {
-                        *out = dot(row, weights);
-                    }
-                }
-            },
-        );
-        out
+        self.kernel.weighted_sums(&self.points, &self.weights, &Points::new(x, &self.kernel.metric))
     }
 
     /// Takes what variances need from the search for the weights.

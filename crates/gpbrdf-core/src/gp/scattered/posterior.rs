@@ -8,11 +8,12 @@ use serde_json::{Value, json};
 use super::ScatteredGp;
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
-use crate::gp::hyper::Hyper;
+use crate::gp::dense::row_major;
+use crate::gp::hyper::{Hyper, length_scale_report};
 use crate::gp::posterior::{DeviceForm, KernelSum, Posterior};
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
-use crate::kernel::{Kernel, KernelBody};
+use crate::kernel::Kernel;
 use crate::sample::space::InputSpace;
 
 /// The solver's name in files and reports.
@@ -102,13 +103,8 @@ impl Posterior for ScatteredPosterior {
     }
 
     fn report(&self) -> Value {
-        let lengths = self.gp.kernel.terms.iter().map(|term| match &term.body {
-            KernelBody::Ard { length_scale, .. } => json!(length_scale),
-            KernelBody::Product(axes) => json!(axes),
-        });
-        let mut lengths: Vec<Value> = lengths.collect();
         json!({
-            "length_scale": if lengths.len() == 1 { lengths.remove(0) } else { Value::Array(lengths) },
+            "length_scale": length_scale_report(&self.gp.kernel),
             "signal_variance": self.gp.kernel.prior_variance(),
             "noise_variance": self.gp.noise_variance,
             "terms": self.gp.kernel,
@@ -129,13 +125,11 @@ impl Posterior for ScatteredPosterior {
     }
 
     fn device_form(&self) -> DeviceForm<'_> {
-        let n = self.gp.n_samples();
-        let rows = (0..n).flat_map(|i| self.gp.weights.iter().skip(i).step_by(n).copied());
         DeviceForm::KernelSum(KernelSum {
             kernel: &self.gp.kernel,
             space: self.space,
             inputs: &self.gp.inputs,
-            weights: rows.collect(),
+            weights: row_major(&self.gp.weights, self.gp.channels),
             n_channels: self.gp.channels,
         })
     }

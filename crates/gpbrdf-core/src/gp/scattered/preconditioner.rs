@@ -153,8 +153,8 @@ impl Preconditioner {
                         |a| low_rank.rest_variance(process, at(a)),
                         |a| low_rank.rest(process, i, at(a)),
                     );
-                    let least = process.noise[i].max(JITTER * process.kernel.prior_variance());
-                    (b.to_vec(), (low_rank.rest_variance(process, i) - explained).max(least))
+                    let variance = low_rank.rest_variance(process, i) - explained;
+                    (b.to_vec(), variance.max(process.least_variance(i)))
                 },
             )
             .unzip();

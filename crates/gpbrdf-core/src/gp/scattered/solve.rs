@@ -8,18 +8,13 @@ use crate::base::error::{Error, Result};
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{Fitted, Problem};
-use crate::gp::report::{FitReport, Noise};
 use crate::sample::space::InputSpace;
 
 /// Finds hyper-parameters in each of the spaces to choose from, follows those of the largest likelihood while
 /// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance,
 /// so only the shapes of the first axis are used.
 pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
-    if let Noise::Fixed(variance) = problem.noise
-        && !(variance > 0.0 && variance.is_finite())
-    {
-        return Err(Error::argument("noise variance", "a positive number", variance));
-    }
+    problem.noise.validate()?;
     let spaces = problem.space.map_or(InputSpace::ISOTROPIC.to_vec(), |space| vec![space]);
     let mut evaluations = 0;
     let mut best: Option<Search<'_>> = None;
@@ -36,7 +31,8 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     evaluations -= best.evaluations;
     let space = best.space;
     let (data, state, mut report) = best.finish()?;
-    let (gp, value) = state.condition(problem, &data, &mut report)?;
+    state.report_samples(&data, &mut report);
+    let (gp, value) = state.condition(problem, &data)?;
     report.log_marginal_likelihood = value;
     report.evaluations += evaluations;
     Ok((Arc::new(ScatteredPosterior { gp, space }), report))
@@ -47,7 +43,7 @@ pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn
     let space = problem.space.or(hyper.space).unwrap_or(InputSpace::ISOTROPIC[0]);
     let data = data(problem, space)?;
     let state = State::known(hyper.kernel.clone(), hyper.noise_variance, &data);
-    let (gp, value) = state.condition(problem, &data, &mut FitReport::default())?;
+    let (gp, value) = state.condition(problem, &data)?;
     Ok((Arc::new(ScatteredPosterior { gp, space }), value))
 }
 

@@ -134,8 +134,8 @@ fn four_thousand_samples_agree_with_the_dense_process() {
         let (gp, value) = with_problem(&y, Outliers::Keep, |problem| {
             let data = Data::new(&points, &y, &[]);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
-            let (data, state, mut report) = search.finish().unwrap();
-            state.condition(problem, &data, &mut report).unwrap()
+            let (data, state, _) = search.finish().unwrap();
+            state.condition(problem, &data).unwrap()
         });
         let (kernel, own) = (gp.kernel.clone(), gp.noise_variance);
         let dense = DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel, own).unwrap();
@@ -165,10 +165,8 @@ fn few_samples_are_left_out_exactly() {
         DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel(), 0.01).unwrap().leave_one_out();
     let dense = dense.unwrap();
     let mut report = FitReport::default();
-    with_problem(&y, Outliers::Keep, |problem| {
-        let data = Data::new(&points, &y, &[]);
-        State::known(kernel(), 0.01, &data).condition(problem, &data, &mut report).unwrap()
-    });
+    let data = Data::new(&points, &y, &[]);
+    State::known(kernel(), 0.01, &data).report_samples(&data, &mut report);
     let found = report.leave_one_out.unwrap();
     for (a, b) in found.residuals.iter().zip(&dense.residuals) {
         assert!((a - b).abs() < 1e-7, "{a} {b}");
@@ -188,7 +186,7 @@ fn known_noise_counts_for_its_sample_only() {
         with_problem(y, Outliers::Keep, |problem| {
             let data = Data::new(points, y, known);
             let state = State::known(kernel(), 1e-4, &data);
-            state.condition(problem, &data, &mut FitReport::default()).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
+            state.condition(problem, &data).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
         })
     };
     let without =
@@ -214,7 +212,8 @@ fn outliers_are_found_and_nothing_else() {
             let data = Data::new(&points, &y, &[]);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, mut report) = search.finish().unwrap();
-            let (gp, _) = state.condition(problem, &data, &mut report).unwrap();
+            state.report_samples(&data, &mut report);
+            let (gp, _) = state.condition(problem, &data).unwrap();
             (gp.noise_variance.sqrt(), report)
         })
     };
@@ -235,8 +234,8 @@ fn the_order_of_samples_changes_no_bit() {
         with_problem(y, Outliers::Downweight, |problem| {
             let data = Data::new(points, y, &[]);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
-            let (data, state, mut report) = search.finish().unwrap();
-            let (gp, value) = state.condition(problem, &data, &mut report).unwrap();
+            let (data, state, _) = search.finish().unwrap();
+            let (gp, value) = state.condition(problem, &data).unwrap();
             (gp.mean_at(&[0.1, 0.2, 0.3]), value, gp.kernel)
         })
     };

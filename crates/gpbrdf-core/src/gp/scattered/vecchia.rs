@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::conditional::{JITTER, Process, Scratch};
+use super::conditional::{Process, Scratch};
 use super::neighbours::Neighbours;
 
 /// Number of conditionals of a parallel task.
@@ -117,8 +117,7 @@ impl Conditional {
         self.coefficients[..m].copy_from_slice(coefficients);
         let b = &self.coefficients[..m];
         process.kernel.gradient(point, point, &mut self.own);
-        let least = process.noise[i].max(JITTER * process.kernel.prior_variance());
-        let variance = (process.diagonal(i) - explained).max(least);
+        let variance = (process.diagonal(i) - explained).max(process.least_variance(i));
         let channels = targets.y.len() as f64;
         let mut density = -0.5 * channels * (std::f64::consts::TAU * variance).ln();
         let mut slope_of_variance = -0.5 * channels / variance;

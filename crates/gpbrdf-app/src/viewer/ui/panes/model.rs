@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
-use gpbrdf_core::judge::LeftOut;
+use gpbrdf_core::judge::{LeftOut, Outlier};
 use gpbrdf_core::{LatticeLayout, MeanFunction, Shape, Symmetry};
 
 use crate::job::{
@@ -304,14 +304,7 @@ fn left_out_ui(line: &dyn Fn(&mut Ui, &str, String, &str), ui: &mut Ui, left_out
     if outliers.is_empty() {
         return;
     }
-    let mut places: Vec<String> = outliers
-        .iter()
-        .take(LISTED)
-        .map(|outlier| match outlier.line {
-            Some(line) => format!("line {line}"),
-            None => format!("sample {}", outlier.sample + 1),
-        })
-        .collect();
+    let mut places: Vec<String> = outliers.iter().take(LISTED).map(Outlier::place).collect();
     if outliers.len() > LISTED {
         places.push(format!("and {} more", outliers.len() - LISTED));
     }
