@@ -24,7 +24,7 @@ pub enum Solver {
     Auto,
     /// Kronecker algebra, for samples that lie on a lattice; conditioning takes milliseconds.
     Lattice,
-    /// Nearest-neighbour likelihood and conjugate gradients, for up to 100,000 samples at any directions.
+    /// Nearest-neighbour likelihood and conjugate gradients, for tens of thousands of samples at any directions.
     Scattered,
     /// Cholesky factorisation, for samples at any directions; conditioning takes `O(n^3)`.
     Dense,
