@@ -60,6 +60,7 @@ pub mod gp;
 pub mod judge;
 pub mod kernel;
 pub mod model;
+pub mod prior;
 pub mod sample;
 #[cfg(test)]
 mod test_data;

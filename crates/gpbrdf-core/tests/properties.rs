@@ -51,13 +51,13 @@ fn scattered(count: usize, seed: u64) -> SampleSet {
 
 fn dense_hyper(shape: Shape, variance: f64, length: f64) -> Hyper {
     let kernel = Kernel::ard(variance, shape, &[length, 1.3 * length, 2.0 * length]);
-    Hyper { solver: Solver::Dense, kernel, noise_variance: 1e-3 * variance, space: None }
+    Hyper::new(Solver::Dense, kernel, 1e-3 * variance, None)
 }
 
 fn lattice_hyper(shape: Shape, variance: f64, length: f64) -> Hyper {
     let axes = AXES.map(|metric| (Kernel1d::new(shape, length), metric));
     let kernel = Kernel::product(variance, axes.to_vec());
-    Hyper { solver: Solver::Lattice, kernel, noise_variance: 1e-3 * variance, space: None }
+    Hyper::new(Solver::Lattice, kernel, 1e-3 * variance, None)
 }
 
 /// A model on a small lattice and one of scattered samples, each with its largest prior variance.

@@ -6,6 +6,7 @@ mod eval;
 mod fit;
 mod info;
 mod input;
+mod learn;
 mod materials;
 mod parse;
 mod predict;
@@ -58,6 +59,8 @@ enum Command {
     Slice(slice::SliceCommand),
     /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
     Render(Box<render::Render>),
+    /// Learn a prior from other materials, with which fewer measurements are enough.
+    Learn(learn::Learn),
     /// Write any source as .binary, .exr, .csv or Zemax .bsdf.
     Convert(convert::Convert),
     /// The paper's experiments, as tables and pictures.
@@ -95,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
         Command::Render(command) => command.run(&terminal),
+        Command::Learn(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
         Command::Reproduce(command) => command.run(&terminal),
         Command::Shader(command) => command.run(&terminal),

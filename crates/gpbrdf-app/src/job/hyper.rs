@@ -46,7 +46,7 @@ mod tests {
         let shapes = [Shape::Matern52, Shape::RationalQuadratic { alpha: 2.0 }, Shape::SquaredExponential];
         let axes = shapes.map(|shape| (Kernel1d::new(shape, 0.1), AxisMetric::Linear));
         let kernel = Kernel::product(2.0, axes.to_vec());
-        let hyper = Hyper { solver: Solver::Lattice, kernel, noise_variance: 1e-5, space: None };
+        let hyper = Hyper::new(Solver::Lattice, kernel, 1e-5, None);
         let sliders = hyper_sliders(&hyper);
         let names: Vec<&str> = sliders.iter().map(|slider| slider.name.as_str()).collect();
         assert_eq!(

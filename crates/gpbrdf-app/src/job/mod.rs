@@ -21,6 +21,7 @@ mod forecast;
 mod hyper;
 mod judge;
 mod kernels;
+mod prior;
 mod report;
 mod run;
 mod sample;
@@ -28,12 +29,13 @@ mod spec;
 mod stage;
 
 pub(crate) use backend::Backend;
-pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
+pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice, parse_lattice};
 pub(crate) use forecast::samples_within;
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
+pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]
 pub(crate) use run::is_cancelled;

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice, named, parse_lattice};
 use super::compression::{Compression, refuse_others};
 use super::kernels::Kernels;
+use super::prior::PriorName;
 
 /// Number of values that the paper takes, 2.58 % of a table.
 pub(crate) const PAPER_SAMPLES: usize = 37_616;
@@ -76,6 +77,10 @@ pub(crate) struct ModelSpec {
     /// of weak priors for what the samples leave open.
     #[arg(long)]
     pub(crate) no_hyper_priors: bool,
+    /// What is known of other materials, for samples off a lattice and for lattices of few nodes: the prior that comes
+    /// with the program, one that `gpbrdf-cli learn` has written, or none.
+    #[arg(long, value_name = "built-in|none|FILE", default_value_t)]
+    pub(crate) prior: PriorName,
     /// What to do about suspected outliers among scattered samples: take them like all others, or give them a
     /// larger noise. They are listed either way where the noise is larger.
     #[arg(long, default_value = "downweight", value_parser = named::<Outliers>(&["keep", "downweight"]))]
@@ -112,6 +117,7 @@ impl Default for ModelSpec {
             mean: MeanFunction::default(),
             noise: NoiseChoice::default(),
             no_hyper_priors: false,
+            prior: PriorName::default(),
             outliers: Outliers::default(),
             seed: 0,
             restarts: 0,
@@ -215,6 +221,7 @@ impl ModelSpec {
             noise: self.noise.noise(),
             per_channel: self.per_channel,
             hyper_priors: !self.no_hyper_priors,
+            prior: self.prior.open()?,
             outliers: self.outliers,
             space,
             optimize: OptimizeOptions {

@@ -28,7 +28,7 @@ pub use measured::text::write::{write_samples_csv, write_samples_csv_to};
 pub use measured::zemax::{SpecularGrid, SpecularTable, write_zemax, write_zemax_to};
 pub use measured::{AngleUnit, ReadOptions, ValueKind, Zenith};
 pub use merl::{MERL_BYTES, merl_material_name, read_merl, write_merl, write_merl_to};
-pub use neural::read_neural_csv;
+pub use neural::{is_neural_csv, read_neural_csv};
 pub use rgl::{RglBrdf, read_rgl};
 pub use source::{Content, Source};
 

@@ -1,5 +1,6 @@
 //! Tables of Neural BRDF weights.
 
+use std::io::Read;
 use std::path::Path;
 
 use crate::base::error::{Error, Result};
@@ -10,6 +11,9 @@ const FORMAT: &str = "Neural BRDF";
 
 /// Limit on the size of a file; it holds more than a thousand materials.
 const MAX_BYTES: u64 = 1 << 24;
+
+/// How much of a file tells whether it is such a table.
+const HEAD_BYTES: u64 = 4096;
 
 /// The columns after `material`, in the order of [`NeuralBrdf::new`].
 fn columns() -> Vec<String> {
@@ -24,6 +28,18 @@ fn columns() -> Vec<String> {
         .chain(matrix("w3", 21, 3))
         .chain(offsets("b3", 3))
         .collect()
+}
+
+/// Whether a file starts like a table of Neural BRDF weights. A file that cannot be read does not.
+#[must_use]
+pub fn is_neural_csv(path: impl AsRef<Path>) -> bool {
+    let mut head = Vec::new();
+    let start = std::fs::File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    start.is_ok()
+        && String::from_utf8_lossy(&head).lines().next().is_some_and(|line| {
+            let mut names = line.split(',').map(str::trim);
+            names.any(|name| name == "material") && names.any(|name| name == "w1_0_0")
+        })
 }
 
 /// Reads a CSV file of Neural BRDF fits with one row per material. The column `material` and the 675 columns

@@ -26,6 +26,21 @@ pub struct Hyper {
     /// The input space of the kernel, where a solver has chosen it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub space: Option<InputSpace>,
+    /// The variance of the principal functions of a learned prior, where one is used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub basis_variance: Option<f64>,
+    /// The hyper-parameters of the chromatic colours, where a learned prior is used; the others are those of the
+    /// achromatic one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chromatic: Option<Box<Hyper>>,
+}
+
+impl Hyper {
+    /// Hyper-parameters that all channels share, without a learned prior.
+    #[must_use]
+    pub fn new(solver: Solver, kernel: Kernel, noise_variance: f64, space: Option<InputSpace>) -> Self {
+        Self { solver, kernel, noise_variance, space, basis_variance: None, chromatic: None }
+    }
 }
 
 /// The length scales of a kernel as JSON for reports: of its only term, or a list with those of each.
@@ -135,7 +150,7 @@ mod tests {
             (Solver::Lattice, product, HyperKind::Alpha(Some(1))),
             (Solver::Dense, ard, HyperKind::Alpha(None)),
         ] {
-            let mut hyper = Hyper { solver, kernel, noise_variance: 1e-5, space: None };
+            let mut hyper = Hyper::new(solver, kernel, 1e-5, None);
             let count = hyper.parameters().len();
             assert_eq!(count, 6);
             assert!(hyper.parameters().iter().any(|p| p.kind == alpha));

@@ -19,6 +19,7 @@ pub(crate) mod tensors;
 pub(crate) mod dense;
 pub(crate) mod inducing;
 pub(crate) mod lattice;
+pub(crate) mod learned;
 pub(crate) mod scattered;
 
 pub use cost::FitCost;
@@ -28,7 +29,7 @@ pub use hyper::{Hyper, HyperKind, HyperParameter};
 pub use inducing::{InducingComponent, InducingGp, InducingShape};
 pub(crate) use lattice::kronecker::apply as contract;
 pub use lattice::{AxisBasis, LatticeData, LatticeGp, LatticeHyper, SeparableForm};
-pub use posterior::{DeviceForm, KernelSum, Posterior, SeparablePart};
+pub use posterior::{DeviceForm, KernelSum, KernelSums, Posterior, SeparablePart, Trend};
 pub use solver::Solver;
 pub use table::{MeanTable, TableGeometry};
 pub use tensors::{TensorReader, TensorWriter};

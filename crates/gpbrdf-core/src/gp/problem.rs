@@ -13,6 +13,7 @@ use crate::gp::optimize::OptimizeOptions;
 use crate::gp::posterior::Posterior;
 use crate::gp::report::{FitReport, Noise};
 use crate::kernel::Shape;
+use crate::prior::Prior;
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::space::InputSpace;
 
@@ -21,6 +22,7 @@ pub(crate) type Fitted = (Arc<dyn Posterior>, FitReport);
 
 /// The input of a solver: directions, zero-mean targets of channels that share hyper-parameters, and the
 /// settings of the search.
+#[derive(Clone)]
 pub(crate) struct Problem<'a> {
     /// Directions of the samples.
     pub(crate) angles: &'a [HalfDiff],
@@ -40,12 +42,27 @@ pub(crate) struct Problem<'a> {
     pub(crate) priors: bool,
     /// The variance that targets usually have, for these priors; `None` where only the targets tell.
     pub(crate) usual_variance: Option<f64>,
+    /// A prior learned from other materials, if it is to be used.
+    pub(crate) prior: Option<Arc<Prior>>,
+    /// Functions that describe the targets together with the kernel.
+    pub(crate) basis: Option<BasisTerm<'a>>,
     /// What is done about outliers.
     pub(crate) outliers: Outliers,
     /// Settings of the search.
     pub(crate) optimize: &'a OptimizeOptions,
     /// Counts the evaluations of the likelihood and calls the observer before each of them.
     pub(crate) watch: &'a Watch<'a>,
+}
+
+/// Basis functions with independent coefficients of the same variance, about 1.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BasisTerm<'a> {
+    /// The number of functions.
+    pub(crate) count: usize,
+    /// Their values at the samples, one row per sample.
+    pub(crate) rows: &'a [f64],
+    /// The standard deviation of what they usually leave.
+    pub(crate) left: f64,
 }
 
 impl Problem<'_> {

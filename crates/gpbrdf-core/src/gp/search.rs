@@ -13,6 +13,12 @@ const NOISE_PRIOR: (f64, f64) = (2.5e-5, 2.5);
 /// Standard deviation of the logarithm of a signal variance about the usual variance of targets.
 const VARIANCE_DEVIATION: f64 = 1.2;
 
+/// The prior of the variance of basis functions: they come with variances of their own, so it is about 1.
+const BASIS_PRIOR: (f64, f64) = (1.0, 0.6);
+
+/// The least and the largest variance of basis functions.
+const BASIS_RANGE: (f64, f64) = (1e-3, 1e2);
+
 /// The prior of the mixture parameter of a rational quadratic kernel.
 const ALPHA_PRIOR: (f64, f64) = (1.0, 1.5);
 
@@ -25,15 +31,26 @@ pub struct UsualValues {
     pub variance: Option<f64>,
 }
 
-/// A kernel that is a sum of ARD kernels, and the parameters of a search: the kernel's and, where it is
-/// optimised, the noise variance.
+/// A kernel that is a sum of ARD kernels, and the parameters of a search: the kernel's, the variance of basis functions
+/// where there are any and, where it is optimised, the noise variance.
 #[derive(Clone, Debug)]
 pub(crate) struct SearchStart {
     pub(crate) kernel: Kernel,
     pub(crate) parameters: Vec<Parameter>,
     noise: Noise,
-    /// The usual variance of targets, or their mean square.
+    has_basis: bool,
+    /// The usual variance of what the kernel describes, or the mean square of the targets.
     variance: f64,
+    /// The usual noise variance.
+    noise_variance: f64,
+}
+
+/// The hyper-parameters beside those of a kernel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OtherParameters {
+    pub(crate) noise_variance: f64,
+    /// Meaningless where there is no basis.
+    pub(crate) basis_variance: f64,
 }
 
 impl SearchStart {
@@ -62,7 +79,35 @@ impl SearchStart {
                 prior: None,
             });
         }
-        Self { kernel, parameters, noise, variance: usual_variance.unwrap_or(variance) }
+        let variance = usual_variance.unwrap_or(variance);
+        let noise_variance = NOISE_PRIOR.0 * variance;
+        Self { kernel, parameters, noise, has_basis: false, variance, noise_variance }
+    }
+
+    /// Adds the variance of basis functions to the parameters. The kernel describes what the functions leave, which
+    /// usually has the standard deviation `left`.
+    pub(crate) fn with_basis(mut self, left: f64) -> Self {
+        self.variance = left * left;
+        let kinds = self.kernel.parameter_kinds();
+        let share = self.variance / self.kernel.terms.len() as f64;
+        for (parameter, kind) in self.parameters.iter_mut().zip(&kinds) {
+            if *kind == ParameterKind::Variance {
+                parameter.lower = parameter.lower.min((1e-4 * share).ln());
+                parameter.start = share.ln();
+            }
+        }
+        self.parameters.insert(
+            kinds.len(),
+            Parameter {
+                name: "prior_variance".into(),
+                start: BASIS_PRIOR.0.ln(),
+                lower: BASIS_RANGE.0.ln(),
+                upper: BASIS_RANGE.1.ln(),
+                prior: None,
+            },
+        );
+        self.has_basis = true;
+        self
     }
 
     /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the usual
@@ -77,7 +122,8 @@ impl SearchStart {
                 Some(ParameterKind::Variance) => (self.variance / terms, VARIANCE_DEVIATION),
                 Some(ParameterKind::Alpha) => ALPHA_PRIOR,
                 Some(ParameterKind::Weight) => (1.0, VARIANCE_DEVIATION),
-                None => (NOISE_PRIOR.0 * self.variance, NOISE_PRIOR.1),
+                None if self.has_basis && k == kinds.len() => BASIS_PRIOR,
+                None => (self.noise_variance, NOISE_PRIOR.1),
             };
             let prior = LogNormal::new(median, deviation);
             parameter.prior = Some(prior);
@@ -99,16 +145,19 @@ impl SearchStart {
         }
     }
 
-    /// Sets the parameters of a kernel and returns the noise variance.
+    /// Sets the parameters of a kernel and returns the others.
     ///
     /// # Errors
     /// Log-parameters whose exponential is zero or not finite.
-    pub(crate) fn set(&self, kernel: &mut Kernel, log_parameters: &[f64]) -> Result<f64> {
-        let count = kernel.n_parameters();
-        kernel.set_log_parameters(&log_parameters[..count])?;
-        Ok(match self.noise {
-            Noise::Optimized => log_parameters[count].exp(),
-            Noise::Fixed(variance) => variance,
+    pub(crate) fn set(&self, kernel: &mut Kernel, log_parameters: &[f64]) -> Result<OtherParameters> {
+        let (of_kernel, others) = log_parameters.split_at(kernel.n_parameters());
+        kernel.set_log_parameters(of_kernel)?;
+        Ok(OtherParameters {
+            basis_variance: if self.has_basis { others[0].exp() } else { 0.0 },
+            noise_variance: match self.noise {
+                Noise::Optimized => others[usize::from(self.has_basis)].exp(),
+                Noise::Fixed(variance) => variance,
+            },
         })
     }
 }

@@ -12,7 +12,7 @@ use crate::gp::posterior::Posterior;
 #[cfg(feature = "fit")]
 use crate::gp::problem::{Fitted, Problem};
 use crate::gp::tensors::TensorReader;
-use crate::gp::{dense, inducing, lattice, scattered};
+use crate::gp::{dense, inducing, lattice, learned, scattered};
 
 /// The solver that a fit uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,6 +49,9 @@ impl Solver {
 impl Solver {
     /// Finds hyper-parameters and conditions the process at them.
     pub(crate) fn fit(self, problem: &Problem<'_>) -> Result<Fitted> {
+        if let Some(prior) = &problem.prior {
+            return learned::solve::fit(problem, prior);
+        }
         match self.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::fit(problem),
             Self::Scattered => scattered::solve::fit(problem),
@@ -59,6 +62,9 @@ impl Solver {
     /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood
     /// there.
     pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn Posterior>, f64)> {
+        if let Some(prior) = &problem.prior {
+            return learned::solve::condition(problem, prior, hyper);
+        }
         match hyper.solver.resolve(problem.lattice.is_some()) {
             Self::Lattice => lattice::solve::condition(problem, hyper),
             Self::Scattered => scattered::solve::condition(problem, hyper),
@@ -73,6 +79,7 @@ pub(crate) fn load(solver: &str, header: Value, tensors: &TensorReader<'_>) -> R
         lattice::posterior::NAME => lattice::posterior::load(header, tensors),
         dense::posterior::NAME => dense::posterior::load(header, tensors),
         scattered::posterior::NAME => scattered::posterior::load(header, tensors),
+        learned::posterior::NAME => learned::posterior::load(header, tensors),
         inducing::posterior::NAME => inducing::posterior::load(header, tensors),
         other => Err(tensors.wrong("a solver of this version", format!("\"{other}\""))),
     }

@@ -1,12 +1,31 @@
 //! Fitting a model to samples, and conditioning one at known hyper-parameters.
 
+use std::sync::Arc;
+
 use crate::base::error::{Error, Result};
 use crate::brdf::Rgb;
 use crate::gp::problem::{Problem, Watch};
 use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Outliers, Solver};
 use crate::kernel::Shape;
 use crate::model::Model;
-use crate::sample::{InputSpace, MeanFunction, SampleSet, Transform};
+use crate::prior::Prior;
+use crate::sample::{InputSpace, MeanFunction, SampleSet, Symmetry, Transform};
+
+/// The largest number of samples off a lattice, and of nodes of a lattice, for which a learned prior is used.
+const MOST_SAMPLES_WITH_PRIOR: usize = 20_000;
+const FEW_NODES: usize = 400;
+
+/// What is known of other materials.
+#[derive(Clone, Debug, Default)]
+pub enum PriorChoice {
+    /// The prior that comes with this crate, [`Prior::built_in`].
+    #[default]
+    BuiltIn,
+    /// Nothing.
+    None,
+    /// What was learned from a library.
+    Learned(Arc<Prior>),
+}
 
 /// Options of [`fit`].
 #[derive(Clone, Debug)]
@@ -27,6 +46,8 @@ pub struct FitOptions {
     /// open: length scales, signal variance and noise about those that measured materials usually have.
     /// Without them the likelihood alone decides, as in the paper.
     pub hyper_priors: bool,
+    /// What is known of other materials. It is used for samples off a lattice and for those on a lattice of few nodes.
+    pub prior: PriorChoice,
     /// What is done about samples that contradict all samples around them.
     pub outliers: Outliers,
     /// Whether each channel gets its own hyper-parameters instead of shared ones.
@@ -49,6 +70,7 @@ impl Default for FitOptions {
             mean: MeanFunction::default(),
             noise: Noise::default(),
             hyper_priors: true,
+            prior: PriorChoice::default(),
             outliers: Outliers::default(),
             per_channel: false,
             space: None,
@@ -65,12 +87,47 @@ impl FitOptions {
         Self { kernel: std::array::from_fn(|_| shapes.to_vec()), ..self }
     }
 
+    /// The prior that a fit to these samples uses, if any: that of the options for targets that it describes, channels
+    /// that share hyper-parameters with weak priors, isotropic bilateral materials, and a solver that is not that of
+    /// another kind of samples. With [`Solver::Auto`] samples on a lattice use it where they are few.
+    #[must_use]
+    pub fn prior(&self, samples: &SampleSet) -> Option<Arc<Prior>> {
+        let by_solver = match (self.solver, samples.lattice()) {
+            (Solver::Scattered, _) => true,
+            (Solver::Auto, None) => samples.len() <= MOST_SAMPLES_WITH_PRIOR,
+            (Solver::Auto, Some(lattice)) => {
+                samples.len() <= FEW_NODES && lattice.symmetry == Symmetry::Bilateral
+            }
+            _ => false,
+        };
+        let is_described = self.transform == Prior::TRANSFORM
+            && self.mean == MeanFunction::Constant
+            && self.hyper_priors
+            && !self.per_channel
+            && self.space.is_none_or(InputSpace::is_isotropic);
+        if !(by_solver && is_described) {
+            return None;
+        }
+        match &self.prior {
+            PriorChoice::BuiltIn => Some(Prior::built_in()),
+            PriorChoice::None => None,
+            PriorChoice::Learned(prior) => Some(Arc::clone(prior)),
+        }
+    }
+
+    /// These options with the mean of a prior, if there is one.
+    fn with_mean_of(&self, prior: Option<&Arc<Prior>>) -> Self {
+        let mean = if prior.is_some() { MeanFunction::Learned } else { self.mean };
+        Self { mean, ..self.clone() }
+    }
+
     /// The input of a solver for one group of channels that share hyper-parameters.
     fn problem<'a>(
         &'a self,
         samples: &'a SampleSet,
         targets: Vec<Vec<f64>>,
         known_noise: &'a [f64],
+        prior: Option<Arc<Prior>>,
         watch: &'a Watch<'a>,
     ) -> Problem<'a> {
         Problem {
@@ -83,6 +140,8 @@ impl FitOptions {
             known_noise,
             priors: self.hyper_priors,
             usual_variance: self.transform.usual_variance(),
+            prior,
+            basis: None,
             outliers: self.outliers,
             optimize: &self.optimize,
             watch,
@@ -115,6 +174,8 @@ pub struct Conditioned {
 /// No samples, values that are not finite, invalid options, the lattice solver for samples off a lattice, a
 /// dense fit that does not fit in memory, and [`Error::Cancelled`] as soon as the observer stops the search.
 pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
+    let prior = options.prior(samples);
+    let options = &options.with_mean_of(prior.as_ref());
     let (targets, offsets) = targets(samples, options)?;
     if options.kernel.iter().any(Vec::is_empty) {
         return Err(Error::argument("kernel", "at least one shape", "none"));
@@ -125,7 +186,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     let fitted = groups.iter().map(|channels| {
         let noise = known_noise(samples, options.transform, channels);
         let targets = channels.iter().map(|&c| targets[c].clone()).collect();
-        options.solver.fit(&options.problem(samples, targets, &noise, &watch))
+        options.solver.fit(&options.problem(samples, targets, &noise, prior.clone(), &watch))
     });
     let (posteriors, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     let origin = samples.origin.clone();
@@ -143,11 +204,13 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
 /// No samples, values that are not finite, hyper-parameters out of range, or hyper-parameters of a lattice
 /// process for samples off a lattice.
 pub fn condition(samples: &SampleSet, options: &FitOptions, hyper: &Hyper) -> Result<Conditioned> {
+    let prior = if hyper.chromatic.is_some() { options.prior(samples) } else { None };
+    let options = &options.with_mean_of(prior.as_ref());
     let (targets, offsets) = targets(samples, options)?;
     let watch = Watch::new(&options.observer);
     let noise = known_noise(samples, options.transform, &[0, 1, 2]);
     let (posterior, log_marginal_likelihood) =
-        Solver::condition(&options.problem(samples, targets, &noise, &watch), hyper)?;
+        Solver::condition(&options.problem(samples, targets, &noise, prior, &watch), hyper)?;
     let origin = samples.origin.clone();
     let model = Model::new(origin, options.transform, options.mean, offsets, vec![posterior])?;
     Ok(Conditioned { model, log_marginal_likelihood })

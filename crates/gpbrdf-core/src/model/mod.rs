@@ -12,7 +12,7 @@ pub use bake::{Baked, bake_mean, bake_sigma};
 #[cfg(feature = "fit")]
 pub use compress::{CellWeights, CompressOptions, InducingSize, compress};
 #[cfg(feature = "fit")]
-pub use fit::{Conditioned, Fit, FitOptions, condition, fit};
+pub use fit::{Conditioned, Fit, FitOptions, PriorChoice, condition, fit};
 pub(crate) use interval::interval_about;
 pub use interval::{IntervalOf, Intervals};
 

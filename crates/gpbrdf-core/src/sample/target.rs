@@ -111,6 +111,8 @@ pub enum MeanFunction {
     Constant,
     /// Zero. This is the paper's own setting.
     Zero,
+    /// That of a learned prior, which differs from direction to direction.
+    Learned,
 }
 
 impl MeanFunction {

@@ -10,7 +10,7 @@ mod targets;
 
 use std::ops::ControlFlow;
 
-use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart, Trend};
 use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{Model, Transform};
 
@@ -57,9 +57,9 @@ enum Form<'a> {
     KernelSum(KernelSum<'a>, usize),
 }
 
-/// The parts of a model.
-fn parts(model: &Model) -> Result<Vec<Part<'_>>> {
-    let mut parts = Vec::new();
+/// The parts of a model that shaders evaluate, and the one that the processor evaluates in every cell beforehand.
+fn parts(model: &Model) -> Result<(Vec<Part<'_>>, Option<Trend<'_>>)> {
+    let (mut parts, mut trend) = (Vec::new(), None);
     for (first, posterior) in model.posteriors() {
         match posterior.device_form() {
             DeviceForm::Separable(summands) => {
@@ -70,13 +70,15 @@ fn parts(model: &Model) -> Result<Vec<Part<'_>>> {
                     parts.push(Part { space: space.into(), form });
                 }
             }
-            DeviceForm::KernelSum(sum) => {
-                parts.push(Part { space: sum.space, form: Form::KernelSum(sum, first) });
+            DeviceForm::KernelSum(all) => {
+                let sums = all.sums.into_iter();
+                parts.extend(sums.map(|sum| Part { space: sum.space, form: Form::KernelSum(sum, first) }));
+                trend = trend.or(all.trend);
             }
             _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
         }
     }
-    Ok(parts)
+    Ok((parts, trend))
 }
 
 impl Baker {
@@ -122,8 +124,8 @@ impl Baker {
             return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
         }
         let context = &self.context;
-        let parts = parts(model)?;
-        let targets = Targets::new(context, model.space(), &parts)?;
+        let (parts, trend) = parts(model)?;
+        let targets = Targets::new(context, model.space(), &parts, trend)?;
         let mut mixed = false;
         for (i, part) in parts.iter().enumerate() {
             let share = |done: f64| (i as f64 + done) / parts.len() as f64;

@@ -83,7 +83,7 @@ impl DenseFit<'_> {
             search(&problem, &data, options, evaluation)?
         };
         let mut kernel = problem.kernel.clone();
-        let noise_variance = problem.set(&mut kernel, &found.log_parameters)?;
+        let noise_variance = problem.set(&mut kernel, &found.log_parameters)?.noise_variance;
         let gp = DenseGp::fit_at(x, &y, channels, kernel, noise_variance)?;
         let report = FitReport {
             log_marginal_likelihood: found.value - found.log_prior,
@@ -139,7 +139,7 @@ fn search(
     let mut kernel = start.kernel.clone();
     maximize(&start.parameters, data.y.len(), options, |p| {
         evaluation()?;
-        let noise = start.set(&mut kernel, p)?;
+        let noise = start.set(&mut kernel, p)?.noise_variance;
         let mut at = evaluator.evaluate_with_gradient(&kernel, noise)?;
         at.gradient.truncate(p.len());
         Ok((at.log_marginal_likelihood, at.gradient))

@@ -9,7 +9,7 @@ use super::DenseGp;
 use crate::base::error::Result;
 use crate::brdf::angles::HalfDiff;
 use crate::gp::hyper::{Hyper, length_scale_report};
-use crate::gp::posterior::{DeviceForm, KernelSum, Posterior};
+use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::kernel::Kernel;
@@ -92,7 +92,7 @@ impl Posterior for DensePosterior {
 
     fn hyper(&self) -> Option<Hyper> {
         let (kernel, noise_variance) = (self.gp.kernel().clone(), self.gp.noise_variance());
-        Some(Hyper { solver: Solver::Dense, kernel, noise_variance, space: Some(self.space) })
+        Some(Hyper::new(Solver::Dense, kernel, noise_variance, Some(self.space)))
     }
 
     fn kernel_name(&self) -> String {
@@ -124,12 +124,12 @@ impl Posterior for DensePosterior {
     }
 
     fn device_form(&self) -> DeviceForm<'_> {
-        DeviceForm::KernelSum(KernelSum {
+        DeviceForm::KernelSum(KernelSums::from(KernelSum {
             kernel: self.gp.kernel(),
             space: self.space,
             inputs: self.gp.inputs(),
             weights: self.gp.weights(),
             n_channels: self.gp.channels(),
-        })
+        }))
     }
 }

@@ -104,7 +104,7 @@ impl Posterior for LatticePosterior {
         let LatticeHyper { signal_variance, noise_variance, kernels } = self.gp.hyper().clone();
         let metrics: [AxisMetric; 3] = self.gp.data().metrics;
         let kernel = Kernel::product(signal_variance, kernels.into_iter().zip(metrics).collect());
-        Some(Hyper { solver: Solver::Lattice, kernel, noise_variance, space: None })
+        Some(Hyper::new(Solver::Lattice, kernel, noise_variance, None))
     }
 
     fn kernel_name(&self) -> String {

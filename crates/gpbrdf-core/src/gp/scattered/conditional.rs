@@ -1,9 +1,29 @@
 //! The distribution of one sample given a few others: the building block of the nearest-neighbour likelihood,
 //! of the preconditioner, of variances and of leave-one-out predictions.
 
+use crate::base::simd::dot;
 use crate::kernel::Kernel;
 
-/// A process at given hyper-parameters, and its samples.
+/// Functions `b` that add `v b(x)^T b(x')` to a covariance, by their values at the samples. There may be none.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Basis {
+    /// The number of functions.
+    pub(super) count: usize,
+    /// One row of values per sample.
+    pub(super) rows: Vec<f64>,
+}
+
+impl Basis {
+    /// The values at sample `i`.
+    pub(super) fn row(&self, i: usize) -> &[f64] {
+        &self.rows[i * self.count..(i + 1) * self.count]
+    }
+}
+
+/// A process with the covariance `k(x, x') + v b(x)^T b(x')` at given hyper-parameters, and its samples.
+///
+/// Source of the second term: C. E. Rasmussen and C. K. I. Williams, "Gaussian Processes for Machine Learning"
+/// (2006), section 2.7, with independent standard normal coefficients.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Process<'a> {
     pub(super) kernel: &'a Kernel,
@@ -11,6 +31,9 @@ pub(super) struct Process<'a> {
     pub(super) x: &'a [f64],
     /// Noise variance of each sample.
     pub(super) noise: &'a [f64],
+    pub(super) basis: &'a Basis,
+    /// `v`, which means nothing where the basis has no functions.
+    pub(super) basis_variance: f64,
 }
 
 /// Added to the diagonal of covariances, relative to the prior variance, so that samples at the same place
@@ -26,7 +49,28 @@ impl Process<'_> {
 
     /// Covariance of two samples, without noise.
     pub(super) fn covariance(&self, i: usize, j: usize) -> f64 {
-        self.kernel.value(self.point(i), self.point(j))
+        self.kernel.value(self.point(i), self.point(j)) + self.in_basis(self.basis.row(i), self.basis.row(j))
+    }
+
+    /// The part of a covariance that is due to the basis, from its values at both points.
+    pub(super) fn in_basis(&self, a: &[f64], b: &[f64]) -> f64 {
+        if a.is_empty() { 0.0 } else { self.basis_variance * dot(a, b) }
+    }
+
+    /// The number of log-parameters: the kernel's and, where there is a basis, that of its variance.
+    #[cfg(feature = "fit")]
+    pub(super) fn n_parameters(&self) -> usize {
+        self.kernel.n_parameters() + usize::from(self.basis.count > 0)
+    }
+
+    /// The covariance of two samples, without noise, and its derivative with respect to each log-parameter.
+    #[cfg(feature = "fit")]
+    pub(super) fn gradient(&self, i: usize, j: usize, out: &mut [f64]) -> f64 {
+        let (of_kernel, of_basis) = out.split_at_mut(self.kernel.n_parameters());
+        let value = self.kernel.gradient(self.point(i), self.point(j), of_kernel);
+        let Some(of_basis) = of_basis.first_mut() else { return value };
+        *of_basis = self.in_basis(self.basis.row(i), self.basis.row(j));
+        value + *of_basis
     }
 
     /// The least variance of a measurement of sample `i`, whatever is known.
@@ -37,7 +81,8 @@ impl Process<'_> {
     /// Variance of a measurement of sample `i` before anything is known.
     #[cfg(feature = "fit")]
     pub(super) fn diagonal(&self, i: usize) -> f64 {
-        self.kernel.prior_variance() * (1.0 + JITTER) + self.noise[i]
+        let row = self.basis.row(i);
+        self.kernel.prior_variance() * (1.0 + JITTER) + self.in_basis(row, row) + self.noise[i]
     }
 }
 
@@ -56,18 +101,20 @@ impl Scratch {
         Self { count, factor: vec![0.0; count * count], coefficients: vec![0.0; count] }
     }
 
-    /// Conditions a point on the samples `given`: the coefficients of the samples in its mean, and the
-    /// variance of its noise-free value. Cost: `m^3 / 6` multiply-adds and `m^2 / 2` kernel evaluations.
+    /// Conditions sample `i` on the samples `given`: the coefficients of these in its mean, and the variance of its
+    /// noise-free value. Cost: `m^3 / 6` multiply-adds and `m^2 / 2` kernel evaluations.
     #[cfg(feature = "fit")]
-    pub(super) fn condition(&mut self, process: &Process<'_>, point: &[f64], given: &[u32]) -> (&[f64], f64) {
+    pub(super) fn condition(&mut self, process: &Process<'_>, i: usize, given: &[u32]) -> (&[f64], f64) {
         let at = |a: usize| given[a] as usize;
         let (coefficients, explained) = self.explain(
             given.len(),
             |a, b| process.covariance(at(a), at(b)),
             |a| process.diagonal(at(a)),
-            |a| process.kernel.value(process.point(at(a)), point),
+            |a| process.covariance(at(a), i),
         );
-        (coefficients, (process.kernel.prior_variance() - explained).max(0.0))
+        let row = process.basis.row(i);
+        let prior = process.kernel.prior_variance() + process.in_basis(row, row);
+        (coefficients, (prior - explained).max(0.0))
     }
 
     /// The coefficients of `m` samples in the mean of a point, and the variance that they explain, from the

@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use super::conditional::Basis;
 use super::product::Covariance;
 use crate::gp::cost::FitCost;
 use crate::kernel::{Kernel, Points, Shape};
@@ -39,7 +40,14 @@ fn seconds_per_value() -> f64 {
         let kernel = Kernel::ard(1.0, Shape::Matern52, &[0.3; 3]);
         let x: Vec<f64> = (0..3 * N).map(|i| (0.618_033_988_749_895 * i as f64).fract()).collect();
         let (points, diagonal) = (Points::new(&x, &kernel.metric), vec![0.1; N]);
-        let covariance = Covariance { kernel: &kernel, points: &points, diagonal: &diagonal };
+        let basis = Basis::default();
+        let covariance = Covariance {
+            kernel: &kernel,
+            points: &points,
+            diagonal: &diagonal,
+            basis: &basis,
+            basis_variance: 0.0,
+        };
         let (y, mut out) = (vec![1.0; 3 * N], vec![0.0; 3 * N]);
         let time = |_| {
             let start = Instant::now();

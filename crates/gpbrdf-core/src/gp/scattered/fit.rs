@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::conditional::{Process, Scratch};
+use super::conditional::{Basis, JITTER, Process, Scratch};
 use super::conjugate_gradients;
+use super::exact;
 use super::neighbours::{Embedded, Neighbours, scrambled_order};
 use super::preconditioner::Preconditioner;
 use super::product::Covariance;
@@ -12,7 +13,7 @@ use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
 use crate::base::simd::dot;
-use crate::gp::problem::{Outliers, Problem};
+use crate::gp::problem::{BasisTerm, Outliers, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
 use crate::gp::{LeaveOneOut, OptimizeOptions, Optimum, maximize};
@@ -53,6 +54,7 @@ pub(super) struct Data {
     y: Vec<Vec<f64>>,
     /// What is known of the noise variance of each sample.
     known_noise: Vec<f64>,
+    basis: Basis,
 }
 
 /// Hyper-parameters and weights of samples.
@@ -60,18 +62,34 @@ pub(super) struct Data {
 pub(super) struct State {
     pub(super) kernel: Kernel,
     pub(super) noise_variance: f64,
+    pub(super) basis_variance: f64,
     /// The weight of each sample, in the scrambled order.
     weights: Vec<f64>,
 }
 
 impl Data {
-    pub(super) fn new(points: &[[f64; 3]], targets: &[Vec<f64>], known_noise: &[f64]) -> Self {
+    /// `basis` are the values of basis functions, one row per sample.
+    pub(super) fn new(
+        points: &[[f64; 3]],
+        targets: &[Vec<f64>],
+        known_noise: &[f64],
+        basis: Option<BasisTerm<'_>>,
+    ) -> Self {
         let order = scrambled_order(points.as_flattened(), 3, targets);
         let sorted = |values: &[f64]| -> Vec<f64> { order.iter().map(|&i| values[i as usize]).collect() };
         let x = order.iter().flat_map(|&i| points[i as usize]).collect();
         let y = targets.iter().map(|t| sorted(t)).collect();
         let known_noise = if known_noise.is_empty() { vec![0.0; order.len()] } else { sorted(known_noise) };
-        Self { order, x, y, known_noise }
+        let basis = basis.map_or_else(Basis::default, |BasisTerm { count, rows, .. }| {
+            let row = |&i: &u32| &rows[i as usize * count..(i as usize + 1) * count];
+            Basis { count, rows: order.iter().flat_map(row).copied().collect() }
+        });
+        Self { order, x, y, known_noise, basis }
+    }
+
+    /// The place of each sample in the order that was given.
+    pub(super) fn order(&self) -> impl Iterator<Item = usize> + '_ {
+        self.order.iter().map(|&i| i as usize)
     }
 
     fn len(&self) -> usize {
@@ -123,9 +141,14 @@ impl<'a> Search<'a> {
             &problem.kernel[0],
             problem.noise,
         );
+        let start = problem.basis.map_or(start.clone(), |basis| start.with_basis(basis.left));
         let start = if problem.priors { start.with_priors(space.usual_lengths()) } else { start };
-        let state =
-            State { kernel: start.kernel.clone(), noise_variance: 0.0, weights: vec![1.0; data.len()] };
+        let state = State {
+            kernel: start.kernel.clone(),
+            noise_variance: 0.0,
+            basis_variance: 0.0,
+            weights: vec![1.0; data.len()],
+        };
         let found = maximise(problem, &data, &start, &state, problem.optimize)?;
         let evaluations = found.evaluations;
         Ok(Self { problem, start, found, state, data, space, evaluations })
@@ -172,7 +195,9 @@ impl<'a> Search<'a> {
     /// Goes on from the hyper-parameters that were found.
     fn take_optimum(&mut self) -> Result<()> {
         self.start.start_from(&self.found.log_parameters);
-        self.state.noise_variance = self.start.set(&mut self.state.kernel, &self.found.log_parameters)?;
+        let others = self.start.set(&mut self.state.kernel, &self.found.log_parameters)?;
+        self.state.noise_variance = others.noise_variance;
+        self.state.basis_variance = others.basis_variance;
         Ok(())
     }
 }
@@ -186,16 +211,33 @@ fn maximise(
     options: &OptimizeOptions,
 ) -> Result<Optimum> {
     let n = data.len();
-    let neighbours = Embedded::new(&data.x, &state.kernel).nearest_before(conditioned_on(n));
+    // With a basis all samples are correlated, so few samples are not left to their neighbours.
+    let is_exact = n <= exact::MOST_SAMPLES && data.basis.count > 0;
+    let neighbours = if is_exact {
+        Neighbours::default()
+    } else {
+        Embedded::new(&data.x, &state.kernel).nearest_before(conditioned_on(n))
+    };
     let subset = evenly(n, TERMS);
     let scale = n as f64 / subset.len() as f64;
     let mut kernel = state.kernel.clone();
     maximize(&start.parameters, n * data.y.len(), options, |p| {
         problem.watch.evaluation()?;
-        let noise_variance = start.set(&mut kernel, p)?;
-        let (shared, all) = data.noise(noise_variance, &state.weights);
-        let process = Process { kernel: &kernel, x: &data.x, noise: &all };
+        let others = start.set(&mut kernel, p)?;
+        let (shared, all) = data.noise(others.noise_variance, &state.weights);
+        let process = Process {
+            kernel: &kernel,
+            x: &data.x,
+            noise: &all,
+            basis: &data.basis,
+            basis_variance: others.basis_variance,
+        };
         let targets = Targets { y: &data.y, shared_noise: &shared };
+        if is_exact {
+            let (value, mut gradient) = exact::log_likelihood(&process, &targets)?;
+            gradient.truncate(p.len());
+            return Ok((value, gradient));
+        }
         let (value, mut gradient) = log_likelihood(&process, &targets, &neighbours, &subset);
         gradient.truncate(p.len());
         gradient.iter_mut().for_each(|g| *g *= scale);
@@ -214,20 +256,29 @@ impl State {
     /// value per channel, and variances of a measurement of weight 1.
     fn leave_one_out(&self, data: &Data) -> (Vec<f64>, Vec<f64>, Neighbours) {
         let (_, all) = data.noise(self.noise_variance, &self.weights);
-        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all };
+        let process = self.process(data, &all);
         let nearest = Embedded::new(&data.x, &self.kernel).nearest_others(NEAREST);
+        let of_measurement = |i: usize, latent: f64| latent + self.noise_variance + data.known_noise[i];
+        if data.basis.count > 0
+            && data.len() <= exact::MOST_SAMPLES
+            && let Ok((residuals, variances)) = exact::leave_one_out(&process, &data.y)
+        {
+            let latent = variances.iter().zip(&all).map(|(v, noise)| (v - noise).max(0.0));
+            let variances = latent.enumerate().map(|(i, latent)| of_measurement(i, latent)).collect();
+            return (residuals, variances, nearest);
+        }
         let rows: Vec<(Vec<f64>, f64)> = (0..data.len())
             .into_par_iter()
             .map_init(
                 || Scratch::new(NEAREST),
                 |scratch, i| {
                     let given = nearest.of(i);
-                    let (b, latent) = scratch.condition(&process, process.point(i), given);
+                    let (b, latent) = scratch.condition(&process, i, given);
                     let residual = |y: &Vec<f64>| {
                         y[i] - b.iter().zip(given).map(|(b, &j)| b * y[j as usize]).sum::<f64>()
                     };
                     let residuals = data.y.iter().map(residual).collect();
-                    (residuals, latent + self.noise_variance + data.known_noise[i])
+                    (residuals, of_measurement(i, latent))
                 },
             )
             .collect();
@@ -291,24 +342,44 @@ impl State {
         let n = data.len();
         let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(NEAREST);
         let (_, all) = data.noise(self.noise_variance, &self.weights);
-        let process = Process { kernel: &self.kernel, x: &data.x, noise: &all };
+        let process = self.process(data, &all);
         let preconditioner = Preconditioner::new(&process, neighbours);
         let points = Points::new(&data.x, &self.kernel.metric);
-        let diagonal: Vec<f64> = (0..n).map(|i| process.diagonal(i) - self.kernel.prior_variance()).collect();
-        let covariance = Covariance { kernel: &self.kernel, points: &points, diagonal: &diagonal };
+        let jitter = JITTER * self.kernel.prior_variance();
+        let diagonal: Vec<f64> = all.iter().map(|noise| noise + jitter).collect();
+        let covariance = Covariance {
+            kernel: &self.kernel,
+            points: &points,
+            diagonal: &diagonal,
+            basis: &data.basis,
+            basis_variance: self.basis_variance,
+        };
         let y = data.y.concat();
         let solution =
             conjugate_gradients::solve(&covariance, &preconditioner, &y, &|| problem.watch.evaluation())?;
         let channels = data.y.len();
         let constant = channels as f64 * (n as f64 * std::f64::consts::TAU.ln() + solution.log_det);
         let value = -0.5 * (dot(&y, &solution.x) + constant);
+        let far_field = preconditioner.into_far_field();
         let (noise, x) = (all, data.x.clone());
-        let gp = ScatteredGp::new(self.kernel, self.noise_variance, noise, x, channels, solution.x)?;
-        Ok((gp.with_far_field(preconditioner.into_far_field()), value))
+        let basis = (data.basis.clone(), self.basis_variance);
+        let gp = ScatteredGp::new(self.kernel, self.noise_variance, noise, x, basis, channels, solution.x)?;
+        Ok((gp.with_far_field(far_field), value))
     }
 
     /// Known hyper-parameters, with all samples of weight 1.
-    pub(super) fn known(kernel: Kernel, noise_variance: f64, data: &Data) -> Self {
-        Self { kernel, noise_variance, weights: vec![1.0; data.len()] }
+    pub(super) fn known(kernel: Kernel, noise_variance: f64, basis_variance: f64, data: &Data) -> Self {
+        Self { kernel, noise_variance, basis_variance, weights: vec![1.0; data.len()] }
+    }
+
+    /// The process with this noise variance of each sample.
+    fn process<'a>(&'a self, data: &'a Data, noise: &'a [f64]) -> Process<'a> {
+        Process {
+            kernel: &self.kernel,
+            x: &data.x,
+            noise,
+            basis: &data.basis,
+            basis_variance: self.basis_variance,
+        }
     }
 }

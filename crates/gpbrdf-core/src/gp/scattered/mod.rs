@@ -11,6 +11,8 @@ mod conjugate_gradients;
 #[cfg(feature = "fit")]
 pub(crate) mod cost;
 #[cfg(feature = "fit")]
+mod exact;
+#[cfg(feature = "fit")]
 mod fit;
 mod neighbours;
 pub(crate) mod posterior;
@@ -26,10 +28,11 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use self::conditional::{Process, Scratch};
+use self::conditional::{Basis, Process, Scratch};
 use self::neighbours::Embedded;
 use self::preconditioner::{FarField, Preconditioner};
 use crate::base::error::{Error, Result};
+use crate::base::simd::add_scaled;
 use crate::kernel::{Kernel, Points};
 
 /// The number of nearest samples on which variances, leave-one-out predictions and the preconditioner are
@@ -38,8 +41,8 @@ const NEAREST: usize = 48;
 
 /// A Gaussian process conditioned on scattered samples. The channels share kernel and noise.
 ///
-/// The mean is that of the exact process, `sum_i alpha_i k(x, x_i)` with weights from conjugate gradients. The
-/// variance is that given the 48 nearest samples and, through 200 inducing points, all others.
+/// The covariance is `k(x, x') + v b(x)^T b(x')`, where `b` may be empty. The mean is that of the exact process,
+/// `sum_i alpha_i k(x, x_i) + v b(x)^T sum_i alpha_i b(x_i)` with weights from conjugate gradients. The variance is that given the 48 nearest samples and, through 200 inducing points, all others.
 #[derive(Clone, Debug)]
 pub(crate) struct ScatteredGp {
     kernel: Kernel,
@@ -49,6 +52,8 @@ pub(crate) struct ScatteredGp {
     noise: Vec<f64>,
     /// Coordinates of the samples, `n` rows.
     inputs: Vec<f64>,
+    basis: Basis,
+    basis_variance: f64,
     points: Points,
     embedded: Embedded,
     channels: usize,
@@ -63,25 +68,27 @@ impl ScatteredGp {
     ///
     /// # Errors
     /// Sizes that do not agree, no samples, or an invalid kernel or noise variance.
-    pub(crate) fn new(
+    fn new(
         kernel: Kernel,
         noise_variance: f64,
         noise: Vec<f64>,
         inputs: Vec<f64>,
+        (basis, basis_variance): (Basis, f64),
         channels: usize,
         weights: Vec<f64>,
     ) -> Result<Self> {
         kernel.validate()?;
         let n = noise.len();
-        if n == 0 || channels == 0 || inputs.len() != n * kernel.dimension() || weights.len() != n * channels
-        {
+        let expected = [n * kernel.dimension(), n * channels, n * basis.count];
+        if n == 0 || channels == 0 || [inputs.len(), weights.len(), basis.rows.len()] != expected {
             let found =
                 format!("{n} noise variances, {} coordinates, {} weights", inputs.len(), weights.len());
             return Err(Error::argument("samples", "at least one, each with coordinates and weights", found));
         }
-        let bad = std::iter::once(&noise_variance).chain(&noise).find(|v| !(**v >= 0.0 && v.is_finite()));
+        let variances = [&noise_variance, &basis_variance].into_iter().chain(&noise);
+        let bad = variances.copied().find(|v| !(*v >= 0.0 && v.is_finite()));
         if let Some(bad) = bad {
-            return Err(Error::argument("noise variance", "a number of at least 0", bad));
+            return Err(Error::argument("variance", "a number of at least 0", bad));
         }
         let points = Points::new(&inputs, &kernel.metric);
         let embedded = Embedded::new(&inputs, &kernel);
@@ -90,6 +97,8 @@ impl ScatteredGp {
             noise_variance,
             noise,
             inputs,
+            basis,
+            basis_variance,
             points,
             embedded,
             channels,
@@ -98,14 +107,69 @@ impl ScatteredGp {
         })
     }
 
+    /// A process with a basis: its values at the samples, the number of its functions, and their variance.
+    ///
+    /// # Errors
+    /// Those of [`ScatteredGp::new`].
+    pub(crate) fn with_basis(
+        kernel: Kernel,
+        noise_variance: f64,
+        noise: Vec<f64>,
+        inputs: Vec<f64>,
+        (rows, count, variance): (Vec<f64>, usize, f64),
+        channels: usize,
+        weights: Vec<f64>,
+    ) -> Result<Self> {
+        let basis = (Basis { count, rows }, variance);
+        Self::new(kernel, noise_variance, noise, inputs, basis, channels, weights)
+    }
+
+    pub(crate) fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    pub(crate) fn noise_variance(&self) -> f64 {
+        self.noise_variance
+    }
+
+    /// The variance of the basis.
+    pub(crate) fn basis_variance(&self) -> f64 {
+        self.basis_variance
+    }
+
+    /// Noise variance of each sample.
+    pub(crate) fn noise(&self) -> &[f64] {
+        &self.noise
+    }
+
+    /// Coordinates of the samples, `n` rows.
+    pub(crate) fn inputs(&self) -> &[f64] {
+        &self.inputs
+    }
+
+    /// Weights of the samples, one column per channel.
+    pub(crate) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
     fn n_samples(&self) -> usize {
         self.noise.len()
     }
 
-    /// Posterior mean at `x`, rows of coordinates; rows with one value per channel. Cost: `n` kernel
-    /// evaluations per point.
+    /// The part of the posterior mean at `x`, rows of coordinates, that is due to the kernel; rows with one value per
+    /// channel. Cost: `n` kernel evaluations per point.
     pub(crate) fn mean_at(&self, x: &[f64]) -> Vec<f64> {
         self.kernel.weighted_sums(&self.points, &self.weights, &Points::new(x, &self.kernel.metric))
+    }
+
+    /// The coefficients of the basis in the posterior mean of a channel, `v sum_i alpha_i b(x_i)`.
+    pub(crate) fn basis_coefficients(&self, channel: usize) -> Vec<f64> {
+        let n = self.n_samples();
+        let mut sum = vec![0.0; self.basis.count];
+        for (i, weight) in self.weights[channel * n..(channel + 1) * n].iter().enumerate() {
+            add_scaled(self.basis_variance * weight, self.basis.row(i), &mut sum);
+        }
+        sum
     }
 
     /// Takes what variances need from the search for the weights.
@@ -114,10 +178,11 @@ impl ScatteredGp {
         Self { far_field: OnceLock::from(far_field), ..self }
     }
 
-    /// Variance of the noise-free function at `x`, rows of coordinates. The first call on a loaded process
+    /// Variance of the noise-free function at `x`, rows of coordinates, where the basis has the values `basis`, a row
+    /// per point. The first call on a loaded process
     /// computes the uncertainty of the inducing points. Cost: one distance to every sample, 1,200 kernel values
     /// and 300,000 multiply-adds per point.
-    pub(crate) fn variance_at(&self, x: &[f64]) -> Vec<f64> {
+    pub(crate) fn variance_at(&self, x: &[f64], basis: &[f64]) -> Vec<f64> {
         let process = self.process();
         let far_field = self.far_field.get_or_init(|| {
             Preconditioner::new(&process, self.embedded.nearest_before(NEAREST)).into_far_field()
@@ -127,13 +192,22 @@ impl ScatteredGp {
             .enumerate()
             .map_init(
                 || Scratch::new(NEAREST),
-                |scratch, (j, point)| far_field.variance(&process, point, nearest.of(j), scratch),
+                |scratch, (j, point)| {
+                    let own = &basis[j * self.basis.count..(j + 1) * self.basis.count];
+                    far_field.variance(&process, (point, own), nearest.of(j), scratch)
+                },
             )
             .collect()
     }
 
     fn process(&self) -> Process<'_> {
-        Process { kernel: &self.kernel, x: &self.inputs, noise: &self.noise }
+        Process {
+            kernel: &self.kernel,
+            x: &self.inputs,
+            noise: &self.noise,
+            basis: &self.basis,
+            basis_variance: self.basis_variance,
+        }
     }
 }
 

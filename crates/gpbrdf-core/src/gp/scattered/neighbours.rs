@@ -138,7 +138,7 @@ impl Embedded {
 }
 
 /// A set of samples for each of several points, nearest first.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Neighbours {
     sets: Vec<Vec<u32>>,
 }

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::ScatteredGp;
+use super::conditional::Basis;
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::gp::dense::row_major;
 use crate::gp::hyper::{Hyper, length_scale_report};
-use crate::gp::posterior::{DeviceForm, KernelSum, Posterior};
+use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::kernel::Kernel;
@@ -43,7 +44,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
         return Err(tensors.wrong("a kernel of 3 coordinates", kernel.dimension().to_string()));
     }
     let (x, noise, weights) = (tensors.read("x")?, tensors.read("noise")?, tensors.read("weights")?);
-    let gp = ScatteredGp::new(kernel, noise_variance, noise, x, channels, weights);
+    let gp = ScatteredGp::new(kernel, noise_variance, noise, x, (Basis::default(), 0.0), channels, weights);
     Ok(Arc::new(ScatteredPosterior { gp: gp.map_err(|e| tensors.damaged(e))?, space }))
 }
 
@@ -89,13 +90,13 @@ impl Posterior for ScatteredPosterior {
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
         match angles.iter().find(|angles| !angles.is_finite()) {
             Some(bad) => Err(Error::argument("angles", "finite numbers", format!("{bad:?}"))),
-            None => Ok(self.gp.variance_at(&self.points(angles))),
+            None => Ok(self.gp.variance_at(&self.points(angles), &[])),
         }
     }
 
     fn hyper(&self) -> Option<Hyper> {
         let (kernel, noise_variance) = (self.gp.kernel.clone(), self.gp.noise_variance);
-        Some(Hyper { solver: Solver::Scattered, kernel, noise_variance, space: Some(self.space) })
+        Some(Hyper::new(Solver::Scattered, kernel, noise_variance, Some(self.space)))
     }
 
     fn kernel_name(&self) -> String {
@@ -125,12 +126,12 @@ impl Posterior for ScatteredPosterior {
     }
 
     fn device_form(&self) -> DeviceForm<'_> {
-        DeviceForm::KernelSum(KernelSum {
+        DeviceForm::KernelSum(KernelSums::from(KernelSum {
             kernel: &self.gp.kernel,
             space: self.space,
             inputs: &self.gp.inputs,
             weights: row_major(&self.gp.weights, self.gp.channels),
             n_channels: self.gp.channels,
-        })
+        }))
     }
 }

@@ -1,8 +1,8 @@
 //! An approximate inverse of the covariance of scattered samples: long-range correlations by inducing points,
 //! what is left by nearest neighbours.
 //!
-//! The covariance is split as `K = B B^T + R`, where `B B^T` is what the first samples of the order know of all
-//! others (Nystrom). The inverse of the rest `R`, noise included, is a sparse product `U U^T` from conditionals
+//! The covariance is split as `K = B B^T + R`, where `B B^T` is the part that a basis spans, and what the first
+//! samples of the order know of all others (Nystrom). The inverse of the rest `R`, noise included, is a sparse product `U U^T` from conditionals
 //! on nearest neighbours, and the inverse of the sum follows from Woodbury's formula. Source: T. Gyger, R.
 //! Furrer and F. Sigrist, "Vecchia-Inducing-Points Full-Scale Approximations for Gaussian Processes" (2025).
 
@@ -14,17 +14,19 @@ use crate::base::linalg::{factorize, product_into_slice, solve_lower, view_slice
 #[cfg(feature = "fit")]
 use crate::base::linalg::{half_log_det, solve};
 use crate::base::simd::{add_scaled, dot};
-use crate::kernel::Kernel;
 
 /// The largest number of inducing points, and the number of samples for each of them.
 const MOST_POINTS: usize = 200;
 const SAMPLES_PER_POINT: usize = 8;
 
-/// A matrix `B B^T` of low rank: `B = k(X, Z) L^-T` with the inducing points `Z`, which are the first samples, and
-/// the Cholesky factor `L` of `k(Z, Z)`.
+/// A matrix `B B^T` of low rank: `B = [sqrt(v) b(X), k(X, Z) L^-T]` with the basis `b`, the inducing points `Z`, which
+/// are the first samples, and the Cholesky factor `L` of `k(Z, Z)`.
 #[derive(Clone, Debug)]
 struct LowRank {
-    rank: usize,
+    /// Number of columns of the basis, which come first.
+    basis: usize,
+    /// Number of inducing points.
+    points: usize,
     factor: Vec<f64>,
     /// Rows of `B`.
     rows: Vec<f64>,
@@ -32,51 +34,63 @@ struct LowRank {
 
 impl LowRank {
     /// The part of the first samples of the order; of none where their covariance cannot be factorised.
-    fn new(kernel: &Kernel, x: &[f64], n: usize) -> Self {
-        let mut rank = (n / SAMPLES_PER_POINT).min(MOST_POINTS);
-        let dimension = kernel.dimension();
-        let at = |i: usize| &x[i * dimension..(i + 1) * dimension];
-        let mut factor = vec![0.0; rank * rank];
-        for j in 0..rank {
-            for i in j..rank {
-                factor[j * rank + i] = kernel.value(at(i), at(j));
+    fn new(process: &Process<'_>) -> Self {
+        let n = process.noise.len();
+        let mut points = (n / SAMPLES_PER_POINT).min(MOST_POINTS);
+        let mut factor = vec![0.0; points * points];
+        for j in 0..points {
+            for i in j..points {
+                factor[j * points + i] = process.kernel.value(process.point(i), process.point(j));
             }
             // Enough for samples at the same place; what is lost here is left to the neighbours.
-            factor[j * rank + j] *= 1.0 + 1e-8;
+            factor[j * points + j] *= 1.0 + 1e-8;
         }
-        if !factorize(&mut factor, rank) {
-            rank = 0;
+        if !factorize(&mut factor, points) {
+            points = 0;
         }
-        let mut found = Self { rank, factor, rows: Vec::new() };
-        if rank > 0 {
-            found.rows = (0..n).into_par_iter().flat_map_iter(|i| found.at(kernel, x, at(i))).collect();
+        let mut found = Self { basis: process.basis.count, points, factor, rows: Vec::new() };
+        if found.rank() > 0 {
+            let row = |i: usize| found.at(process, process.point(i), process.basis.row(i));
+            found.rows = (0..n).into_par_iter().flat_map_iter(row).collect();
         }
         found
     }
 
-    /// The row of a point.
-    fn at(&self, kernel: &Kernel, x: &[f64], point: &[f64]) -> Vec<f64> {
-        let inducing = x.chunks(kernel.dimension()).take(self.rank);
-        let mut row: Vec<f64> = inducing.map(|z| kernel.value(z, point)).collect();
-        if self.rank > 0 {
-            solve_lower(&self.factor, self.rank, &mut row);
+    /// The number of columns of `B`.
+    fn rank(&self) -> usize {
+        self.basis + self.points
+    }
+
+    /// The row of a point with these values of the basis.
+    fn at(&self, process: &Process<'_>, point: &[f64], basis: &[f64]) -> Vec<f64> {
+        let scale = process.basis_variance.sqrt();
+        let inducing = process.x.chunks(process.kernel.dimension()).take(self.points);
+        let covariances = inducing.map(|z| process.kernel.value(z, point));
+        let mut row: Vec<f64> = basis.iter().map(|b| scale * b).chain(covariances).collect();
+        if self.points > 0 {
+            solve_lower(&self.factor, self.points, &mut row[self.basis..]);
         }
         row
     }
 
     /// Row `i` of `B`.
     fn row(&self, i: usize) -> &[f64] {
-        &self.rows[i * self.rank..(i + 1) * self.rank]
+        &self.rows[i * self.rank()..(i + 1) * self.rank()]
+    }
+
+    /// Row `i` of the columns of the inducing points.
+    fn inducing(&self, i: usize) -> &[f64] {
+        &self.row(i)[self.basis..]
     }
 
     /// The covariance of two samples that `B B^T` leaves.
     fn rest(&self, process: &Process<'_>, i: usize, j: usize) -> f64 {
-        process.covariance(i, j) - dot(self.row(i), self.row(j))
+        process.kernel.value(process.point(i), process.point(j)) - dot(self.inducing(i), self.inducing(j))
     }
 
     /// The variance of a measurement of a sample that `B B^T` leaves.
     fn rest_variance(&self, process: &Process<'_>, i: usize) -> f64 {
-        let (prior, known) = (process.kernel.prior_variance(), dot(self.row(i), self.row(i)));
+        let (prior, known) = (process.kernel.prior_variance(), dot(self.inducing(i), self.inducing(i)));
         (prior - known).max(0.0) + JITTER * prior + process.noise[i]
     }
 }
@@ -90,34 +104,36 @@ pub(super) struct FarField {
 }
 
 impl FarField {
-    /// Variance of the noise-free function at a point given its nearest samples and, through the inducing points,
-    /// all others: `v + c^T S^-1 c` with `c = b(x) - sum_i beta_i b_i`, where `beta` and `v` are coefficients and
+    /// Variance of the noise-free function at a point with these values of the basis, given its nearest samples and,
+    /// through basis and inducing points, all others: `v + c^T S^-1 c` with `c = b(x) - sum_i beta_i b_i`, where `beta` and `v` are coefficients and
     /// variance of the rest given the rests of the nearest samples.
     pub(super) fn variance(
         &self,
         process: &Process<'_>,
-        point: &[f64],
+        (point, basis): (&[f64], &[f64]),
         nearest: &[u32],
         scratch: &mut Scratch,
     ) -> f64 {
         let low_rank = &self.low_rank;
-        let mut known = low_rank.at(process.kernel, process.x, point);
+        let mut known = low_rank.at(process, point, basis);
+        let own = &known[low_rank.basis..];
         let at = |a: usize| nearest[a] as usize;
         let (b, explained) = scratch.explain(
             nearest.len(),
             |a, b| low_rank.rest(process, at(a), at(b)),
             |a| low_rank.rest_variance(process, at(a)),
-            |a| process.kernel.value(process.point(at(a)), point) - dot(low_rank.row(at(a)), &known),
+            |a| process.kernel.value(process.point(at(a)), point) - dot(low_rank.inducing(at(a)), own),
         );
-        let rest = process.kernel.prior_variance() - dot(&known, &known) - explained;
+        let rest = process.kernel.prior_variance() - dot(own, own) - explained;
         for (a, b) in b.iter().enumerate() {
             add_scaled(-b, low_rank.row(at(a)), &mut known);
         }
-        if low_rank.rank > 0 {
-            solve_lower(&self.capacitance, low_rank.rank, &mut known);
+        if low_rank.rank() > 0 {
+            solve_lower(&self.capacitance, low_rank.rank(), &mut known);
         }
         // Rounding must not make anything less certain than it was before.
-        (rest.max(0.0) + dot(&known, &known)).min(process.kernel.prior_variance())
+        let prior = process.kernel.prior_variance() + process.in_basis(basis, basis);
+        (rest.max(0.0) + dot(&known, &known)).min(prior)
     }
 }
 
@@ -139,7 +155,7 @@ pub(super) struct Preconditioner {
 impl Preconditioner {
     /// Computes all conditionals. Cost: `O(n m^2 (m + q))` with `m` neighbours and `q` inducing points.
     pub(super) fn new(process: &Process<'_>, neighbours: Neighbours) -> Self {
-        let low_rank = LowRank::new(process.kernel, process.x, process.noise.len());
+        let low_rank = LowRank::new(process);
         let (coefficients, variances): (Vec<Vec<f64>>, Vec<f64>) = (0..neighbours.len())
             .into_par_iter()
             .map_init(
@@ -158,7 +174,7 @@ impl Preconditioner {
                 },
             )
             .unzip();
-        let rank = low_rank.rank;
+        let rank = low_rank.rank();
         let mut whitened = vec![0.0; low_rank.rows.len()];
         let mut capacitance = vec![0.0; rank * rank];
         if rank > 0 {
@@ -188,13 +204,13 @@ impl Preconditioner {
     #[cfg(feature = "fit")]
     pub(super) fn log_det(&self) -> f64 {
         let rest: f64 = self.variances.iter().map(|v| v.ln()).sum();
-        rest + 2.0 * half_log_det(&self.capacitance, self.low_rank.rank)
+        rest + 2.0 * half_log_det(&self.capacitance, self.low_rank.rank())
     }
 
     /// A sample of the process whose covariance this inverts, from standard normal numbers.
     #[cfg(feature = "fit")]
     pub(super) fn sample(&self, normal: &mut dyn FnMut() -> f64) -> Vec<f64> {
-        let weights: Vec<f64> = (0..self.low_rank.rank).map(|_| normal()).collect();
+        let weights: Vec<f64> = (0..self.low_rank.rank()).map(|_| normal()).collect();
         let mut rest = Vec::with_capacity(self.variances.len());
         for (i, (b, v)) in self.coefficients.iter().zip(&self.variances).enumerate() {
             let known: f64 = b.iter().zip(self.neighbours.of(i)).map(|(b, &j)| b * rest[j as usize]).sum();
@@ -206,7 +222,7 @@ impl Preconditioner {
     /// `out = U (I - C S^-1 C^T) U^T r` with `C = U^T B` and `S = I + C^T C`. Cost: `2 n (m + q)` multiply-adds.
     #[cfg(feature = "fit")]
     pub(super) fn apply(&self, r: &[f64], out: &mut [f64]) {
-        let rank = self.low_rank.rank;
+        let rank = self.low_rank.rank();
         let mut white: Vec<f64> = self
             .coefficients
             .iter()

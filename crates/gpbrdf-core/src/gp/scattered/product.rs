@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::conditional::Basis;
 use crate::base::simd::{add_scaled, dot};
 use crate::kernel::{Kernel, Points, RowScratch};
 
@@ -11,13 +12,16 @@ const TILE: usize = 512;
 /// Number of partial sums. It does not depend on the number of threads, so neither do the results.
 const PARTS: usize = 16;
 
-/// The covariance of `n` samples: `k(X, X) + diag(noise)`.
+/// The covariance of `n` samples: `k(X, X) + v b(X) b(X)^T + diag(noise)`.
 #[derive(Debug)]
 pub(super) struct Covariance<'a> {
     pub(super) kernel: &'a Kernel,
     pub(super) points: &'a Points,
     /// What is added to the diagonal.
     pub(super) diagonal: &'a [f64],
+    /// The basis `b`, and `v`.
+    pub(super) basis: &'a Basis,
+    pub(super) basis_variance: f64,
 }
 
 impl Covariance<'_> {
@@ -58,6 +62,15 @@ impl Covariance<'_> {
         }
         for part in parts {
             add_scaled(1.0, &part, out);
+        }
+        if self.basis.count > 0 {
+            for (x, out) in x.chunks(n).zip(out.chunks_mut(n)) {
+                let mut sum = vec![0.0; self.basis.count];
+                x.iter()
+                    .enumerate()
+                    .for_each(|(i, &x)| add_scaled(self.basis_variance * x, self.basis.row(i), &mut sum));
+                out.iter_mut().enumerate().for_each(|(i, out)| *out += dot(self.basis.row(i), &sum));
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-use super::conditional::Process;
+use super::conditional::{Basis, Process};
 use super::fit::{Data, Search, State};
 use super::neighbours::Embedded;
 use super::vecchia::{Targets, log_likelihood};
@@ -43,6 +43,8 @@ fn with_problem<R>(targets: &[Vec<f64>], outliers: Outliers, run: impl FnOnce(&P
         known_noise: &[],
         priors: true,
         usual_variance: None,
+        prior: None,
+        basis: None,
         outliers,
         optimize: &optimize,
         watch: &watch,
@@ -62,7 +64,7 @@ fn with_all_earlier_samples_the_likelihood_is_the_exact_one() {
         let subset: Vec<u32> = (0..40).collect();
         let at = |kernel: &Kernel, noise: f64| {
             let noise = vec![noise; 40];
-            let process = Process { kernel, x, noise: &noise };
+            let process = Process { kernel, x, noise: &noise, basis: &Basis::default(), basis_variance: 0.0 };
             log_likelihood(&process, &Targets { y: &y, shared_noise: &noise }, &all, &subset)
         };
         let (value, gradient) = at(&kernel, 0.02);
@@ -96,7 +98,8 @@ fn gradients_match_finite_differences_where_neighbours_are_few() {
             let mut kernel = kernel.clone();
             kernel.set_log_parameters(&p[..p.len() - 1]).unwrap();
             let (shared, all) = noise_of(p[p.len() - 1]);
-            let process = Process { kernel: &kernel, x, noise: &all };
+            let process =
+                Process { kernel: &kernel, x, noise: &all, basis: &Basis::default(), basis_variance: 0.0 };
             log_likelihood(&process, &Targets { y: &y, shared_noise: &shared }, &neighbours, &subset)
         };
         let (_, gradient) = at(&start);
@@ -132,7 +135,7 @@ fn four_thousand_samples_agree_with_the_dense_process() {
             })
             .collect();
         let (gp, value) = with_problem(&y, Outliers::Keep, |problem| {
-            let data = Data::new(&points, &y, &[]);
+            let data = Data::new(&points, &y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, _) = search.finish().unwrap();
             state.condition(problem, &data).unwrap()
@@ -144,7 +147,7 @@ fn four_thousand_samples_agree_with_the_dense_process() {
         let at = crate::sample::random_directions(200, 0.97, 9);
         let test: Vec<f64> = at.iter().flat_map(|&a| space.coordinates(a)).collect();
         let (mean, expected) = (gp.mean_at(&test), dense.predict_mean(&test).unwrap());
-        let (variance, exact) = (gp.variance_at(&test), dense.predict_variance_latent(&test).unwrap());
+        let (variance, exact) = (gp.variance_at(&test, &[]), dense.predict_variance_latent(&test).unwrap());
         let mut square = 0.0;
         for ((mean, expected), exact) in mean.chunks(CHANNELS).zip(expected.chunks(CHANNELS)).zip(&exact) {
             square += mean.iter().zip(expected).map(|(m, e)| (m - e).powi(2) / exact).sum::<f64>();
@@ -165,8 +168,8 @@ fn few_samples_are_left_out_exactly() {
         DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel(), 0.01).unwrap().leave_one_out();
     let dense = dense.unwrap();
     let mut report = FitReport::default();
-    let data = Data::new(&points, &y, &[]);
-    State::known(kernel(), 0.01, &data).report_samples(&data, &mut report);
+    let data = Data::new(&points, &y, &[], None);
+    State::known(kernel(), 0.01, 0.0, &data).report_samples(&data, &mut report);
     let found = report.leave_one_out.unwrap();
     for (a, b) in found.residuals.iter().zip(&dense.residuals) {
         assert!((a - b).abs() < 1e-7, "{a} {b}");
@@ -184,8 +187,8 @@ fn known_noise_counts_for_its_sample_only() {
     known[7] = 1e6;
     let mean_at = |points: &[[f64; 3]], y: &[Vec<f64>], known: &[f64]| {
         with_problem(y, Outliers::Keep, |problem| {
-            let data = Data::new(points, y, known);
-            let state = State::known(kernel(), 1e-4, &data);
+            let data = Data::new(points, y, known, None);
+            let state = State::known(kernel(), 1e-4, 0.0, &data);
             state.condition(problem, &data).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
         })
     };
@@ -209,7 +212,7 @@ fn outliers_are_found_and_nothing_else() {
     }
     let fit = |outliers| {
         with_problem(&y, outliers, |problem| {
-            let data = Data::new(&points, &y, &[]);
+            let data = Data::new(&points, &y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, mut report) = search.finish().unwrap();
             state.report_samples(&data, &mut report);
@@ -232,7 +235,7 @@ fn the_order_of_samples_changes_no_bit() {
     let (points, y) = data(500, 0.05);
     let fit = |points: &[[f64; 3]], y: &[Vec<f64>]| {
         with_problem(y, Outliers::Downweight, |problem| {
-            let data = Data::new(points, y, &[]);
+            let data = Data::new(points, y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, _) = search.finish().unwrap();
             let (gp, value) = state.condition(problem, &data).unwrap();
@@ -249,7 +252,15 @@ fn angles_are_chords_and_broken_parts_are_refused() {
     let kernel =
         Kernel { metric: vec![AxisMetric::Linear, AxisMetric::Linear, AxisMetric::Chord], ..kernel() };
     let make = |noise: Vec<f64>, weights: usize| {
-        ScatteredGp::new(kernel.clone(), 0.1, noise, vec![0.5; 6], 1, vec![1.0; weights])
+        ScatteredGp::new(
+            kernel.clone(),
+            0.1,
+            noise,
+            vec![0.5; 6],
+            (Basis::default(), 0.0),
+            1,
+            vec![1.0; weights],
+        )
     };
     assert!(make(vec![0.1; 2], 2).is_ok());
     assert!(make(vec![0.1; 2], 3).is_err() && make(vec![-0.1; 2], 2).is_err() && make(vec![], 0).is_err());

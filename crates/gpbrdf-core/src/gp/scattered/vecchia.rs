@@ -24,7 +24,7 @@ pub(super) struct Targets<'a> {
 }
 
 /// The sum of the log densities of the samples `subset`, each given its neighbours, over all channels, and the
-/// derivatives with respect to the kernel's log-parameters and, last, the logarithm of the noise variance that
+/// derivatives with respect to the log-parameters of the process and, last, the logarithm of the noise variance that
 /// all samples share. Cost: `O(m^3)` per sample.
 pub(super) fn log_likelihood(
     process: &Process<'_>,
@@ -32,12 +32,12 @@ pub(super) fn log_likelihood(
     neighbours: &Neighbours,
     subset: &[u32],
 ) -> (f64, Vec<f64>) {
-    let parameters = process.kernel.n_parameters() + 1;
+    let parameters = process.n_parameters() + 1;
     let count = neighbours.largest();
     let blocks: Vec<(f64, Vec<f64>)> = subset
         .par_chunks(BLOCK)
         .map_init(
-            || Conditional::new(count, process.kernel.n_parameters()),
+            || Conditional::new(count, process.n_parameters()),
             |conditional, block| {
                 let mut gradient = vec![0.0; parameters];
                 let density = |i: u32| {
@@ -97,8 +97,8 @@ impl Conditional {
         given: &[u32],
         gradient: &mut [f64],
     ) -> f64 {
-        let (m, parameters) = (given.len(), process.kernel.n_parameters());
-        let (point, at) = (process.point(i), |a: usize| process.point(given[a] as usize));
+        let (m, parameters) = (given.len(), process.n_parameters());
+        let at = |a: usize| given[a] as usize;
         // A pair and its place in the lower triangle.
         let place = |a: usize, b: usize| (a * (a + 1) / 2 + b) * parameters;
         let (pairs, with_point) = (&mut self.pairs, &mut self.point);
@@ -106,17 +106,17 @@ impl Conditional {
             m,
             |a, b| {
                 let out = &mut pairs[place(a, b)..place(a, b) + parameters];
-                process.kernel.gradient(at(a), at(b), out)
+                process.gradient(at(a), at(b), out)
             },
-            |a| process.diagonal(given[a] as usize),
+            |a| process.diagonal(at(a)),
             |a| {
                 let out = &mut with_point[a * parameters..(a + 1) * parameters];
-                process.kernel.gradient(at(a), point, out)
+                process.gradient(at(a), i, out)
             },
         );
         self.coefficients[..m].copy_from_slice(coefficients);
         let b = &self.coefficients[..m];
-        process.kernel.gradient(point, point, &mut self.own);
+        process.gradient(i, i, &mut self.own);
         let variance = (process.diagonal(i) - explained).max(process.least_variance(i));
         let channels = targets.y.len() as f64;
         let mut density = -0.5 * channels * (std::f64::consts::TAU * variance).ln();
@@ -141,11 +141,11 @@ impl Conditional {
         }
         *of_noise += slope_of_variance * targets.shared_noise[i];
         for a in 0..m {
+            process.gradient(at(a), at(a), &mut self.pairs[place(a, a)..place(a, a) + parameters]);
             for l in 0..=a {
-                // -dK_al multiplies q_a b_l and q_l b_a. The prior variance has the same derivative everywhere.
+                // -dK_al multiplies q_a b_l and q_l b_a.
                 let weight = if l == a { of_q(a) * b[a] } else { of_q(a) * b[l] + of_q(l) * b[a] };
-                let pair =
-                    if l == a { &self.own } else { &self.pairs[place(a, l)..place(a, l) + parameters] };
+                let pair = &self.pairs[place(a, l)..place(a, l) + parameters];
                 for (out, d) in of_kernel.iter_mut().zip(pair) {
                     *out -= weight * d;
                 }

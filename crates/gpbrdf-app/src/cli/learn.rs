@@ -1,0 +1,94 @@
+//! `gpbrdf-cli learn`: a prior from a library of materials.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use gpbrdf_core::base::AtomicFile;
+use gpbrdf_core::formats::{is_neural_csv, read_neural_csv};
+use gpbrdf_core::prior::{BoxGrid, Colour, LearnOptions, Library, learn};
+use gpbrdf_core::{Content, FitOptions, fit};
+
+use super::input::open;
+use super::reading::Reading;
+use super::terminal::Terminal;
+use crate::job::parse_lattice;
+
+#[derive(Args, Debug)]
+pub(crate) struct Learn {
+    /// Materials: measurement, table or model files, built-in materials, or tables of Neural BRDF weights, which
+    /// hold many. A file replaces Neural BRDF weights of the same name. Scattered measurements are fitted first.
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// File to write.
+    #[arg(short, long, value_name = "FILE", default_value = "prior.safetensors")]
+    output: PathBuf,
+    /// What reports call the prior.
+    #[arg(long, value_name = "NAME", default_value = "learned")]
+    name: String,
+    /// Leave out the materials whose names begin with one of these words.
+    #[arg(long, value_name = "WORD,WORD,...", value_delimiter = ',')]
+    leave_out: Vec<String>,
+    /// Nodes of the functions along sqrt(theta_h), theta_d and phi_d.
+    #[arg(long, value_name = "HxDxP", value_parser = parse_lattice, default_value = "30x19x10")]
+    grid: [usize; 3],
+    /// The largest number of functions for brightness and for colour.
+    #[arg(long, value_name = "N,N", value_delimiter = ',', num_args = 1, default_value = "60,30")]
+    functions: Vec<usize>,
+    #[command(flatten)]
+    reading: Reading,
+}
+
+impl Learn {
+    pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
+        let [bright, coloured] = self.functions[..] else {
+            bail!("--functions: expected two numbers, found {}", self.functions.len());
+        };
+        let options = LearnOptions { grid: BoxGrid { shape: self.grid }, functions: [bright, coloured] };
+        let mut file = AtomicFile::create(&self.output)?;
+        let library = self.library(options.grid, terminal)?;
+        let prior = terminal.stage("Learning", || anyhow::Ok(learn(&self.name, &library, &options)?))?;
+        file.write_all(&prior.to_bytes()?)
+            .with_context(|| format!("cannot write \"{}\"", self.output.display()))?;
+        file.commit()?;
+        let [bright, coloured] = Colour::ALL.map(|colour| (prior.n_functions(colour), prior.left(colour)));
+        terminal.summary(&format!(
+            "wrote {}: {} functions of {} materials, which leave {:.3} of the logarithm of another's brightness, and \
+             {} functions of their colours, which leave {:.3}",
+            self.output.display(),
+            bright.0,
+            prior.materials.len(),
+            bright.1,
+            coloured.0,
+            coloured.1
+        ))
+    }
+
+    /// All materials at the nodes of a grid.
+    fn library(&self, grid: BoxGrid, terminal: &Terminal) -> Result<Library> {
+        let mut library = Library::new(grid)?;
+        let is_left_out = |name: &str| self.leave_out.iter().any(|word| name.starts_with(word.as_str()));
+        let (weights, others): (Vec<_>, Vec<_>) = self.inputs.iter().partition(|path| is_neural_csv(path));
+        for path in weights {
+            let fits = terminal.stage("Loading", || anyhow::Ok(read_neural_csv(path)?))?;
+            let fits = fits.iter().filter(|(name, _)| !is_left_out(name));
+            fits.for_each(|(name, network)| library.add(name, network));
+        }
+        for path in others {
+            let source = terminal.stage("Loading", || open(path, self.reading, terminal))?;
+            if is_left_out(&source.name) {
+                continue;
+            }
+            match &source.content {
+                Content::Samples(samples) => {
+                    let fitted =
+                        terminal.stage("Fitting", || anyhow::Ok(fit(samples, &FitOptions::default())?))?;
+                    library.add(&source.name, &fitted.model);
+                }
+                _ => library.add(&source.name, source.brdf()?),
+            }
+        }
+        Ok(library)
+    }
+}

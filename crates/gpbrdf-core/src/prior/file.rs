@@ -1,0 +1,172 @@
+//! Files of priors: safetensors in half precision, and the one that is compiled in.
+
+use std::path::Path;
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use serde::{Deserialize, Serialize};
+
+use super::colour::Colour;
+use super::grid::BoxGrid;
+use super::{Functions, Prior};
+use crate::base::atomic_file::AtomicFile;
+use crate::base::error::{Error, Result};
+use crate::base::f16::to_half;
+use crate::gp::table::to_f32;
+use crate::gp::{TensorReader, TensorWriter};
+
+/// The prior that comes with the crate.
+const BUILT_IN: &[u8] = include_bytes!("../../assets/prior.safetensors");
+
+/// The key of the description in the file's metadata.
+const KEY: &str = "gpbrdf_prior";
+
+/// The version of the format that is written, and the only one that is read.
+const VERSION: u32 = 1;
+
+/// What is not a tensor.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct PriorHeader {
+    version: u32,
+    name: String,
+    grid: BoxGrid,
+    left: [f64; 2],
+    materials: Vec<String>,
+}
+
+pub(super) fn built_in() -> Prior {
+    match Prior::from_bytes(BUILT_IN, "built-in prior") {
+        Ok(prior) => prior,
+        Err(error) => unreachable!("{error}"),
+    }
+}
+
+impl Prior {
+    /// Writes the prior. The file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the file cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        AtomicFile::write(path.as_ref(), &self.to_bytes()?)
+    }
+
+    /// The bytes of a file: the tensors `mean` (nodes along `u`, `v`, `phi`), `achromatic` and `chromatic` (the same
+    /// and, last, the function), in half precision.
+    ///
+    /// # Errors
+    /// Numbers that JSON cannot hold.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let unwritable = |e: String| Error::argument("prior", "tensors and metadata of a file", e);
+        let json = serde_json::to_string(&self.header()).map_err(|e| unwritable(e.to_string()))?;
+        let tensors = self.tensors().map(|(name, shape, values)| {
+            let bytes: Vec<u8> = values.iter().flat_map(|&x| to_half(f64::from(x)).to_le_bytes()).collect();
+            (name, shape, bytes)
+        });
+        let views: std::result::Result<Vec<_>, _> = tensors
+            .iter()
+            .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
+            .collect();
+        let views = views.map_err(|e: safetensors::SafeTensorError| unwritable(e.to_string()))?;
+        let metadata = std::iter::once((KEY.to_owned(), json)).collect();
+        safetensors::serialize(views, Some(metadata)).map_err(|e| unwritable(e.to_string()))
+    }
+
+    fn header(&self) -> PriorHeader {
+        PriorHeader {
+            version: VERSION,
+            name: self.name.clone(),
+            grid: self.grid,
+            left: Colour::ALL.map(|colour| self.left(colour)),
+            materials: self.materials.clone(),
+        }
+    }
+
+    /// Names, shapes and values of the tensors.
+    fn tensors(&self) -> [(&'static str, Vec<usize>, &[f32]); 3] {
+        let shape = self.grid.shape;
+        let [a, c] =
+            self.functions.each_ref().map(|f| ([shape.as_slice(), &[f.count]].concat(), f.nodes.as_slice()));
+        [(NAMES[0], shape.to_vec(), &self.mean), (NAMES[1], a.0, a.1), (NAMES[2], c.0, c.1)]
+    }
+
+    /// Adds the tensors to those of a model, and returns the rest.
+    pub(crate) fn add_to(&self, tensors: &mut TensorWriter) -> PriorHeader {
+        for (name, shape, values) in self.tensors() {
+            let values: Vec<f64> = values.iter().copied().map(f64::from).collect();
+            tensors.add_half(&format!("prior.{name}"), &shape, &values);
+        }
+        self.header()
+    }
+
+    /// Reads what [`Prior::add_to`] has written.
+    pub(crate) fn from_tensors(header: PriorHeader, tensors: &TensorReader<'_>) -> Result<Self> {
+        Self::assemble(header, |name| {
+            let values = tensors.read(&format!("prior.{name}"))?;
+            Ok(values.into_iter().map(to_f32).collect())
+        })
+    }
+
+    /// A prior out of a header and tensors by name.
+    fn assemble(header: PriorHeader, read: impl Fn(&str) -> Result<Vec<f32>>) -> Result<Self> {
+        header.grid.validate()?;
+        let nodes = header.grid.len();
+        let [a, c] = [(NAMES[1], header.left[0]), (NAMES[2], header.left[1])].map(|(name, left)| {
+            let values = read(name)?;
+            Ok::<_, Error>(Functions { count: values.len() / nodes, nodes: values, left })
+        });
+        Self::new(header.name, header.materials, header.grid, read(NAMES[0])?, [a?, c?])
+    }
+
+    /// Reads a prior.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is no prior of this version, or is damaged.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|e| Error::read(path, e))?;
+        Self::from_bytes(&bytes, path)
+    }
+
+    /// Reads a prior from the bytes of a file; `path` is only used in error messages.
+    ///
+    /// # Errors
+    /// Bytes that are no prior of this version, or are damaged.
+    pub fn from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let wrong = |expected: &str, found: String| Error::Format {
+            format: "prior",
+            path: path.to_owned(),
+            expected: expected.to_owned(),
+            found,
+        };
+        let parsed = |e: safetensors::SafeTensorError| wrong("a safetensors file", e.to_string());
+        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(parsed)?;
+        let tensors = SafeTensors::deserialize(bytes).map_err(parsed)?;
+        let json = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
+        let json = json.ok_or_else(|| wrong("a learned prior", format!("no metadata entry \"{KEY}\"")))?;
+        let header: PriorHeader =
+            serde_json::from_str(json).map_err(|e| wrong("metadata of a prior", e.to_string()))?;
+        if header.version != VERSION {
+            return Err(wrong(&format!("version {VERSION}"), format!("version {}", header.version)));
+        }
+        let read = |name: &str| -> Result<Vec<f32>> {
+            let tensor =
+                tensors.tensor(name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
+            if tensor.dtype() != Dtype::F16 {
+                return Err(wrong("tensors in half precision", format!("{:?}", tensor.dtype())));
+            }
+            let (chunks, _) = tensor.data().as_chunks::<2>();
+            let values: Vec<f32> = chunks.iter().map(|b| half::f16::from_le_bytes(*b).to_f32()).collect();
+            match values.iter().find(|x| !x.is_finite()) {
+                None => Ok(values),
+                Some(bad) => Err(wrong("finite numbers", format!("{bad} in tensor \"{name}\""))),
+            }
+        };
+        Self::assemble(header, read).map_err(|error| match error {
+            Error::Format { .. } => error,
+            other => wrong("a consistent prior", other.to_string()),
+        })
+    }
+}
+
+/// Names of the tensors.
+const NAMES: [&str; 3] = ["mean", "achromatic", "chromatic"];
