@@ -7,13 +7,12 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::formats::{is_neural_csv, read_neural_csv};
-use gpbrdf_core::prior::{BoxGrid, Colour, LearnOptions, Library, learn};
+use gpbrdf_core::prior::{Colour, LearnOptions, Library, learn};
 use gpbrdf_core::{Content, FitOptions, fit};
 
 use super::input::open;
 use super::reading::Reading;
 use super::terminal::Terminal;
-use crate::job::parse_lattice;
 
 #[derive(Args, Debug)]
 pub(crate) struct Learn {
@@ -30,9 +29,9 @@ pub(crate) struct Learn {
     /// Leave out the materials whose names begin with one of these words.
     #[arg(long, value_name = "WORD,WORD,...", value_delimiter = ',')]
     leave_out: Vec<String>,
-    /// Nodes of the functions along sqrt(theta_h), theta_d and phi_d.
-    #[arg(long, value_name = "HxDxP", value_parser = parse_lattice, default_value = "30x19x10")]
-    grid: [usize; 3],
+    /// Number of directions at which the materials are known.
+    #[arg(long, value_name = "N", default_value_t = Library::CENTRES)]
+    centres: usize,
     /// The largest number of functions for brightness and for colour.
     #[arg(long, value_name = "N,N", value_delimiter = ',', num_args = 1, default_value = "60,30")]
     functions: Vec<usize>,
@@ -45,9 +44,9 @@ impl Learn {
         let [bright, coloured] = self.functions[..] else {
             bail!("--functions: expected two numbers, found {}", self.functions.len());
         };
-        let options = LearnOptions { grid: BoxGrid { shape: self.grid }, functions: [bright, coloured] };
+        let options = LearnOptions { functions: [bright, coloured] };
         let mut file = AtomicFile::create(&self.output)?;
-        let library = self.library(options.grid, terminal)?;
+        let library = self.library(terminal)?;
         let prior = terminal.stage("Learning", || anyhow::Ok(learn(&self.name, &library, &options)?))?;
         file.write_all(&prior.to_bytes()?)
             .with_context(|| format!("cannot write \"{}\"", self.output.display()))?;
@@ -65,9 +64,9 @@ impl Learn {
         ))
     }
 
-    /// All materials at the nodes of a grid.
-    fn library(&self, grid: BoxGrid, terminal: &Terminal) -> Result<Library> {
-        let mut library = Library::new(grid)?;
+    /// All materials.
+    fn library(&self, terminal: &Terminal) -> Result<Library> {
+        let mut library = Library::new(self.centres)?;
         let is_left_out = |name: &str| self.leave_out.iter().any(|word| name.starts_with(word.as_str()));
         let (weights, others): (Vec<_>, Vec<_>) = self.inputs.iter().partition(|path| is_neural_csv(path));
         for path in weights {

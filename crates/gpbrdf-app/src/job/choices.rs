@@ -121,7 +121,7 @@ impl FromStr for NoiseChoice {
 }
 
 /// Nodes of a lattice along each axis, as `48x32x24`.
-pub(crate) fn parse_lattice(text: &str) -> Result<[usize; 3], String> {
+pub(super) fn parse_lattice(text: &str) -> Result<[usize; 3], String> {
     let sides: Option<Vec<usize>> = text.split(['x', 'X']).map(|side| side.parse().ok()).collect();
     sides.and_then(|s| s.try_into().ok()).ok_or_else(|| "expected three numbers like 48x32x24".into())
 }

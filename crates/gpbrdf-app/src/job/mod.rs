@@ -29,7 +29,7 @@ mod spec;
 mod stage;
 
 pub(crate) use backend::Backend;
-pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice, parse_lattice};
+pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
 pub(crate) use forecast::samples_within;
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::hyper_sliders;

@@ -29,7 +29,7 @@ pub use hyper::{Hyper, HyperKind, HyperParameter};
 pub use inducing::{InducingComponent, InducingGp, InducingShape};
 pub(crate) use lattice::kronecker::apply as contract;
 pub use lattice::{AxisBasis, LatticeData, LatticeGp, LatticeHyper, SeparableForm};
-pub use posterior::{DeviceForm, KernelSum, KernelSums, Posterior, SeparablePart, Trend};
+pub use posterior::{DeviceForm, KernelSum, KernelSums, Posterior, SeparablePart};
 pub use solver::Solver;
 pub use table::{MeanTable, TableGeometry};
 pub use tensors::{TensorReader, TensorWriter};

@@ -11,7 +11,6 @@ use crate::gp::lattice::LatticeGp;
 use crate::gp::table::{self, MeanTable};
 use crate::gp::tensors::TensorWriter;
 use crate::kernel::Kernel;
-use crate::prior::BoxGrid;
 use crate::sample::space::{InputSpace, WarpedBox};
 
 /// A Gaussian process conditioned on the targets of one channel, or of several that share hyper-parameters.
@@ -106,35 +105,18 @@ pub enum DeviceForm<'a> {
     KernelSum(KernelSums<'a>),
 }
 
-/// A posterior mean as a sum of kernel sums over the samples and a function on a grid.
+/// A posterior mean as a sum of kernel sums.
 #[derive(Clone, Debug)]
 pub struct KernelSums<'a> {
     /// The kernel sums, at least one; all have the same number of channels.
     pub sums: Vec<KernelSum<'a>>,
-    /// What is added to them, if anything.
-    pub trend: Option<Trend<'a>>,
-}
-
-/// A function of three channels on a grid in the warped box.
-#[derive(Clone, Copy, Debug)]
-pub struct Trend<'a> {
-    /// The grid.
-    pub grid: BoxGrid,
-    /// Values at its nodes, one array per channel.
-    pub nodes: &'a [Vec<f32>; 3],
-}
-
-impl Trend<'_> {
-    /// The values at directions.
-    #[must_use]
-    pub fn values(&self, angles: &[HalfDiff]) -> Vec<[f64; 3]> {
-        self.grid.values(self.nodes, angles)
-    }
+    /// What is added to each channel of the model.
+    pub constants: [f64; 3],
 }
 
 impl<'a> From<KernelSum<'a>> for KernelSums<'a> {
     fn from(sum: KernelSum<'a>) -> Self {
-        Self { sums: vec![sum], trend: None }
+        Self { sums: vec![sum], constants: [0.0; 3] }
     }
 }
 

@@ -1,16 +1,13 @@
-//! Files of priors: safetensors in half precision, and the one that is compiled in.
+//! Files of priors: safetensors in single precision, and the one that is compiled in.
 
 use std::path::Path;
 
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::colour::Colour;
-use super::grid::BoxGrid;
-use super::{Functions, Prior};
+use super::{Functions, Prior, Span};
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
-use crate::base::f16::to_half;
 use crate::gp::table::to_f32;
 use crate::gp::{TensorReader, TensorWriter};
 
@@ -28,7 +25,6 @@ const VERSION: u32 = 1;
 pub(crate) struct PriorHeader {
     version: u32,
     name: String,
-    grid: BoxGrid,
     left: [f64; 2],
     materials: Vec<String>,
 }
@@ -49,8 +45,8 @@ impl Prior {
         AtomicFile::write(path.as_ref(), &self.to_bytes()?)
     }
 
-    /// The bytes of a file: the tensors `mean` (nodes along `u`, `v`, `phi`), `achromatic` and `chromatic` (the same
-    /// and, last, the function), in half precision.
+    /// The bytes of a file: the tensors `mean`, `achromatic` and `chromatic` in single precision, with one row per
+    /// function: its constant, then the coefficients of the centres.
     ///
     /// # Errors
     /// Numbers that JSON cannot hold.
@@ -58,12 +54,12 @@ impl Prior {
         let unwritable = |e: String| Error::argument("prior", "tensors and metadata of a file", e);
         let json = serde_json::to_string(&self.header()).map_err(|e| unwritable(e.to_string()))?;
         let tensors = self.tensors().map(|(name, shape, values)| {
-            let bytes: Vec<u8> = values.iter().flat_map(|&x| to_half(f64::from(x)).to_le_bytes()).collect();
+            let bytes: Vec<u8> = values.iter().flat_map(|&x| to_f32(x).to_le_bytes()).collect();
             (name, shape, bytes)
         });
         let views: std::result::Result<Vec<_>, _> = tensors
             .iter()
-            .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F16, shape.clone(), bytes)?)))
+            .map(|(name, shape, bytes)| Ok((*name, TensorView::new(Dtype::F32, shape.to_vec(), bytes)?)))
             .collect();
         let views = views.map_err(|e: safetensors::SafeTensorError| unwritable(e.to_string()))?;
         let metadata = std::iter::once((KEY.to_owned(), json)).collect();
@@ -74,46 +70,55 @@ impl Prior {
         PriorHeader {
             version: VERSION,
             name: self.name.clone(),
-            grid: self.grid,
-            left: Colour::ALL.map(|colour| self.left(colour)),
+            left: self.left,
             materials: self.materials.clone(),
         }
     }
 
     /// Names, shapes and values of the tensors.
-    fn tensors(&self) -> [(&'static str, Vec<usize>, &[f32]); 3] {
-        let shape = self.grid.shape;
-        let [a, c] =
-            self.functions.each_ref().map(|f| ([shape.as_slice(), &[f.count]].concat(), f.nodes.as_slice()));
-        [(NAMES[0], shape.to_vec(), &self.mean), (NAMES[1], a.0, a.1), (NAMES[2], c.0, c.1)]
+    fn tensors(&self) -> [(&'static str, [usize; 2], Vec<f64>); 3] {
+        let n = self.span.len();
+        let of = |name, functions: &Functions| {
+            let rows = functions.constants.iter().zip(functions.coefficients.chunks(n));
+            let values =
+                rows.flat_map(|(constant, row)| std::iter::once(constant).chain(row)).copied().collect();
+            (name, [functions.count(), 1 + n], values)
+        };
+        let [bright, coloured] = &self.functions;
+        [of(NAMES[0], &self.mean), of(NAMES[1], bright), of(NAMES[2], coloured)]
     }
 
     /// Adds the tensors to those of a model, and returns the rest.
     pub(crate) fn add_to(&self, tensors: &mut TensorWriter) -> PriorHeader {
         for (name, shape, values) in self.tensors() {
-            let values: Vec<f64> = values.iter().copied().map(f64::from).collect();
-            tensors.add_half(&format!("prior.{name}"), &shape, &values);
+            tensors.add(&format!("prior.{name}"), &shape, &values);
         }
         self.header()
     }
 
     /// Reads what [`Prior::add_to`] has written.
     pub(crate) fn from_tensors(header: PriorHeader, tensors: &TensorReader<'_>) -> Result<Self> {
-        Self::assemble(header, |name| {
-            let values = tensors.read(&format!("prior.{name}"))?;
-            Ok(values.into_iter().map(to_f32).collect())
-        })
+        Self::assemble(header, |name| tensors.read(&format!("prior.{name}")))
     }
 
     /// A prior out of a header and tensors by name.
-    fn assemble(header: PriorHeader, read: impl Fn(&str) -> Result<Vec<f32>>) -> Result<Self> {
-        header.grid.validate()?;
-        let nodes = header.grid.len();
-        let [a, c] = [(NAMES[1], header.left[0]), (NAMES[2], header.left[1])].map(|(name, left)| {
-            let values = read(name)?;
-            Ok::<_, Error>(Functions { count: values.len() / nodes, nodes: values, left })
-        });
-        Self::new(header.name, header.materials, header.grid, read(NAMES[0])?, [a?, c?])
+    fn assemble(header: PriorHeader, read: impl Fn(&str) -> Result<Vec<f64>>) -> Result<Self> {
+        let mean = read(NAMES[0])?;
+        let width = mean.len();
+        let span = Span::new(width.saturating_sub(1))?;
+        let functions = |values: Vec<f64>| {
+            if values.len() % width != 0 {
+                let expected = format!("rows of {width}");
+                return Err(Error::argument("coefficients of a prior", expected, values.len()));
+            }
+            let rows = || values.chunks(width);
+            Ok(Functions {
+                constants: rows().map(|row| row[0]).collect(),
+                coefficients: rows().flat_map(|row| &row[1..]).copied().collect(),
+            })
+        };
+        let [bright, coloured] = [read(NAMES[1])?, read(NAMES[2])?].map(functions);
+        Self::new((header.name, header.materials), span, functions(mean)?, [bright?, coloured?], header.left)
     }
 
     /// Reads a prior.
@@ -148,14 +153,14 @@ impl Prior {
         if header.version != VERSION {
             return Err(wrong(&format!("version {VERSION}"), format!("version {}", header.version)));
         }
-        let read = |name: &str| -> Result<Vec<f32>> {
+        let read = |name: &str| -> Result<Vec<f64>> {
             let tensor =
                 tensors.tensor(name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
-            if tensor.dtype() != Dtype::F16 {
-                return Err(wrong("tensors in half precision", format!("{:?}", tensor.dtype())));
+            if tensor.dtype() != Dtype::F32 {
+                return Err(wrong("tensors in single precision", format!("{:?}", tensor.dtype())));
             }
-            let (chunks, _) = tensor.data().as_chunks::<2>();
-            let values: Vec<f32> = chunks.iter().map(|b| half::f16::from_le_bytes(*b).to_f32()).collect();
+            let (chunks, _) = tensor.data().as_chunks::<4>();
+            let values: Vec<f64> = chunks.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect();
             match values.iter().find(|x| !x.is_finite()) {
                 None => Ok(values),
                 Some(bad) => Err(wrong("finite numbers", format!("{bad} in tensor \"{name}\""))),

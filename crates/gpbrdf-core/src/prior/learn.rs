@@ -1,13 +1,14 @@
 //! Learning a prior from a library of materials.
 
+use std::f64::consts::PI;
+
 use rayon::prelude::*;
 
 use super::colour::{Colour, to_opponent};
-use super::grid::BoxGrid;
+use super::span::{SPACE, Span};
 use super::{Functions, Prior};
 use crate::base::error::{Error, Result};
-use crate::base::f16::to_half;
-use crate::base::linalg::{product, symmetric_eigen, view_slice};
+use crate::base::linalg::{factorize, product, solve, symmetric_eigen, view_slice};
 use crate::base::simd::{add_scaled, dot};
 use crate::brdf::Brdf;
 use crate::brdf::angles::HalfDiff;
@@ -15,64 +16,86 @@ use crate::brdf::angles::HalfDiff;
 /// The largest value that is taken from a material, sr^-1.
 const BRIGHTEST: f64 = 1e5;
 
+/// The variance of what is taken for noise in materials, relative to that of the kernel that describes them: published
+/// fits have kinks that reflectances do not have.
+const NOISE: f64 = 2e-4;
+
 /// The number of parts of the library that are left out in turn to see what the functions leave.
 const FOLDS: usize = 8;
 
 /// Size of a prior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LearnOptions {
-    /// Nodes along `u`, `v` and `phi`.
-    pub grid: BoxGrid,
     /// The largest number of achromatic and of chromatic functions. There are never more of them than materials.
     pub functions: [usize; 2],
 }
 
 impl Default for LearnOptions {
-    /// 60 and 30 functions on 30 x 19 x 10 nodes: one mebibyte in half precision.
     fn default() -> Self {
-        Self { grid: BoxGrid { shape: [30, 19, 10] }, functions: [60, 30] }
+        Self { functions: [60, 30] }
     }
 }
 
-/// Materials, each as three colours of `ln(f + 1e-3)` at the nodes of a grid.
+/// Materials, each as three colours of `ln(f + 1e-3)` that are functions of a span.
 #[derive(Clone, Debug)]
 pub struct Library {
-    grid: BoxGrid,
+    span: Span,
+    /// Cholesky factor of the covariance at the centres.
+    factor: Vec<f64>,
     names: Vec<String>,
-    /// For each material, one row of nodes per colour.
-    colours: Vec<[Vec<f64>; 3]>,
+    colours: Vec<[Member; 3]>,
+}
+
+/// A colour of a material: its values at the centres, its constant, and the coefficients of the centres.
+#[derive(Clone, Debug)]
+struct Member {
+    values: Vec<f64>,
+    constant: f64,
+    coefficients: Vec<f64>,
 }
 
 impl Library {
-    /// An empty library.
+    /// The usual number of centres.
+    pub const CENTRES: usize = 1000;
+
+    /// An empty library, of materials that are known at this number of directions.
     ///
     /// # Errors
-    /// A grid of too few or too many nodes.
-    pub fn new(grid: BoxGrid) -> Result<Self> {
-        grid.validate()?;
-        Ok(Self { grid, names: Vec::new(), colours: Vec::new() })
+    /// Fewer than 10 directions, or more than 20,000.
+    pub fn new(centres: usize) -> Result<Self> {
+        let span = Span::new(centres)?;
+        let n = span.len();
+        let x: Vec<[f64; 3]> = span.centres().iter().map(|&at| SPACE.coordinates(at)).collect();
+        let mut factor = vec![0.0; n * n];
+        factor.par_chunks_mut(n).enumerate().for_each(|(j, column)| {
+            for (i, value) in column.iter_mut().enumerate().skip(j) {
+                *value = span.kernel().value(&x[i], &x[j]);
+            }
+            column[j] += NOISE;
+        });
+        if !factorize(&mut factor, n) {
+            return Err(Error::NotPositiveDefinite { size: n, largest_jitter: NOISE });
+        }
+        Ok(Self { span, factor, names: Vec::new(), colours: Vec::new() })
     }
 
-    /// Adds a material: the mean over both orders and all mirror images of each pair of directions. At `theta_h = 0`
-    /// and `theta_d = 0` values are averaged over `phi_d`, which has no meaning there. One of the same name is
-    /// replaced.
+    /// Adds a material: the mean over both orders and all mirror images of each pair of directions, smoothed. One of the
+    /// same name is replaced.
     pub fn add(&mut self, name: &str, brdf: &dyn Brdf) {
-        let [nu, nv, nphi] = self.grid.shape;
-        let rows: Vec<Vec<[f64; 3]>> = (0..nu * nv)
-            .into_par_iter()
-            .map(|row| {
-                let (i, j) = (row / nv, row % nv);
-                let mut values: Vec<[f64; 3]> =
-                    (0..nphi).map(|k| to_opponent(logarithms(brdf, self.grid.node([i, j, k])))).collect();
-                if i == 0 || j == 0 {
-                    let mean =
-                        std::array::from_fn(|c| values.iter().map(|v| v[c]).sum::<f64>() / nphi as f64);
-                    values.fill(mean);
-                }
-                values
-            })
-            .collect();
-        let colours = std::array::from_fn(|c| rows.iter().flatten().map(|v| v[c]).collect());
+        let n = self.span.len();
+        let values: Vec<[f64; 3]> =
+            self.span.centres().par_iter().map(|&at| to_opponent(logarithms(brdf, at))).collect();
+        let columns: [Vec<f64>; 3] = std::array::from_fn(|c| values.iter().map(|v| v[c]).collect());
+        let colours = columns.map(|mut column| {
+            let constant = column.iter().sum::<f64>() / n as f64;
+            column.iter_mut().for_each(|y| *y -= constant);
+            let mut coefficients = column.clone();
+            solve(&self.factor, n, &mut coefficients);
+            // What the noise does not take.
+            add_scaled(-NOISE, &coefficients, &mut column);
+            column.iter_mut().for_each(|y| *y += constant);
+            Member { values: column, constant, coefficients }
+        });
         match self.names.iter().position(|known| known == name) {
             Some(place) => self.colours[place] = colours,
             None => {
@@ -93,16 +116,16 @@ impl Library {
     pub fn without(&self, leave: impl Fn(&str) -> bool) -> Self {
         let kept = || self.names.iter().zip(&self.colours).filter(|(name, _)| !leave(name));
         Self {
-            grid: self.grid,
             names: kept().map(|(name, _)| name.clone()).collect(),
             colours: kept().map(|(_, colours)| colours.clone()).collect(),
+            span: self.span.clone(),
+            factor: self.factor.clone(),
         }
     }
 }
 
 /// `ln(f + 1e-3)` of each channel, averaged over all pairs of directions that are alike by symmetry.
 fn logarithms(brdf: &dyn Brdf, at: HalfDiff) -> [f64; 3] {
-    use std::f64::consts::PI;
     let images = [at.phi_d, PI - at.phi_d, at.phi_d + PI, 2.0 * PI - at.phi_d];
     let values = images.map(|phi_d| brdf.eval_half_diff(HalfDiff { phi_d, ..at }));
     std::array::from_fn(|c| {
@@ -117,7 +140,8 @@ fn logarithms(brdf: &dyn Brdf, at: HalfDiff) -> [f64; 3] {
 /// equally likely in advance; since they rotate the chromatic colours into each other, this changes no function.
 ///
 /// What the functions leave of unknown materials is measured on the library itself, of which one eighth at a time is
-/// left out. Cost: `O(m^2 n)` for `m` materials and `n` nodes. Numbers are rounded to half precision, as in files.
+/// left out. Cost: `O(m^2 n)` for `m` materials known at `n` directions. Numbers are rounded to single precision, as in
+/// files.
 ///
 /// # Errors
 /// Fewer than two materials.
@@ -126,47 +150,58 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
     if count < 2 {
         return Err(Error::argument("materials of a library", "at least 2", count));
     }
-    let nodes = library.grid.len();
-    let mut mean = vec![0.0; nodes];
-    for [bright, ..] in &library.colours {
-        add_scaled(1.0 / count as f64, bright, &mut mean);
-    }
-    let round = |x: f64| to_half(x).to_f32();
+    let n = library.span.len();
+    let mut mean = Member { values: vec![0.0; n], constant: 0.0, coefficients: vec![0.0; n] };
+    library.colours.iter().for_each(|[bright, ..]| mean.add(1.0 / count as f64, bright));
+    let mut left = [0.0; 2];
     let functions = Colour::ALL.map(|colour| {
         let wanted = options.functions[colour as usize];
-        // A group of rows for each material.
-        let groups: Vec<Vec<Vec<f64>>> = library
+        // A group of one or two functions for each material.
+        let groups: Vec<Vec<Member>> = library
             .colours
             .iter()
             .map(|colours| {
-                let own = colours[colour.rows()].iter().cloned();
-                own.map(|row| if colour == Colour::Achromatic { difference(&row, &mean) } else { row })
-                    .collect()
+                let mut own = colours[colour.rows()].to_vec();
+                if colour == Colour::Achromatic {
+                    own.iter_mut().for_each(|member| member.add(-1.0, &mean));
+                }
+                own
             })
             .collect();
-        let rows: Vec<&[f64]> = groups.iter().flatten().map(Vec::as_slice).collect();
-        let principal = principal_functions(&rows, wanted.min(count - 1));
-        let mut at_nodes = vec![0.0; nodes * principal.len()];
-        for (k, function) in principal.iter().enumerate() {
-            for (node, &value) in function.iter().enumerate() {
-                at_nodes[node * principal.len() + k] = round(value);
-            }
+        let all: Vec<&Member> = groups.iter().flatten().collect();
+        left[colour as usize] = what_is_left(&groups, wanted);
+        let principal = principal_functions(&all, wanted.min(count - 1));
+        Functions {
+            constants: principal.iter().map(|f| rounded(f.constant)).collect(),
+            coefficients: principal.iter().flat_map(|f| &f.coefficients).copied().map(rounded).collect(),
         }
-        Functions { count: principal.len(), nodes: at_nodes, left: what_is_left(&groups, wanted) }
     });
-    let mean = mean.into_iter().map(round).collect();
-    Prior::new(name.to_owned(), library.names.clone(), library.grid, mean, functions)
+    let mean = Functions {
+        constants: vec![rounded(mean.constant)],
+        coefficients: mean.coefficients.into_iter().map(rounded).collect(),
+    };
+    Prior::new((name.to_owned(), library.names.clone()), library.span.clone(), mean, functions, left)
 }
 
-fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
+/// The nearest number in single precision.
+fn rounded(x: f64) -> f64 {
+    f64::from(crate::gp::table::to_f32(x))
 }
 
-/// The first principal functions of rows about zero, each times its standard deviation; fewer where the rows do not
-/// span as many.
-fn principal_functions(rows: &[&[f64]], count: usize) -> Vec<Vec<f64>> {
-    let (n, length) = (rows.len(), rows.first().map_or(0, |row| row.len()));
-    let all = rows.concat();
+impl Member {
+    /// Adds a multiple of another function.
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.constant += factor * other.constant;
+        add_scaled(factor, &other.values, &mut self.values);
+        add_scaled(factor, &other.coefficients, &mut self.coefficients);
+    }
+}
+
+/// The first principal functions of members about zero, each times its standard deviation; fewer where the members do
+/// not span as many.
+fn principal_functions(members: &[&Member], count: usize) -> Vec<Member> {
+    let (n, length) = (members.len(), members.first().map_or(0, |member| member.values.len()));
+    let all: Vec<f64> = members.iter().flat_map(|member| &member.values).copied().collect();
     let columns = view_slice(&all, length, n);
     let gram = product(columns.transpose(), columns);
     let Some((values, vectors)) = symmetric_eigen(&gram) else { return Vec::new() };
@@ -174,11 +209,12 @@ fn principal_functions(rows: &[&[f64]], count: usize) -> Vec<Vec<f64>> {
     order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
     let largest = values[order[0]].max(f64::MIN_POSITIVE);
     let kept = order.into_iter().take(count).filter(|&k| values[k] > 1e-9 * largest);
-    // The rows' combination with eigenvector v has the length sqrt(value): divided by sqrt(n), the standard deviation.
+    // The combination with eigenvector v has the length sqrt(value): divided by sqrt(n), the standard deviation.
     kept.map(|k| {
-        let mut function = vec![0.0; length];
-        for (i, row) in rows.iter().enumerate() {
-            add_scaled(vectors[(i, k)] / (n as f64).sqrt(), row, &mut function);
+        let mut function =
+            Member { values: vec![0.0; length], constant: 0.0, coefficients: vec![0.0; length] };
+        for (i, member) in members.iter().enumerate() {
+            function.add(vectors[(i, k)] / (n as f64).sqrt(), member);
         }
         function
     })
@@ -186,26 +222,22 @@ fn principal_functions(rows: &[&[f64]], count: usize) -> Vec<Vec<f64>> {
 }
 
 /// Root mean square of what the functions of the other groups leave of each group, one part of the groups at a time.
-fn what_is_left(groups: &[Vec<Vec<f64>>], count: usize) -> f64 {
+fn what_is_left(groups: &[Vec<Member>], count: usize) -> f64 {
     let folds = FOLDS.min(groups.len());
     let (sum, terms) = (0..folds)
         .into_par_iter()
         .map(|fold| {
             let own = |i: usize| i % folds == fold;
-            let rows: Vec<&[f64]> = groups
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| !own(*i))
-                .flat_map(|(_, rows)| rows.iter().map(Vec::as_slice))
-                .collect();
-            let functions = principal_functions(&rows, count.min(rows.len() - 1));
+            let others: Vec<&Member> =
+                groups.iter().enumerate().filter(|(i, _)| !own(*i)).flat_map(|(_, group)| group).collect();
+            let functions = principal_functions(&others, count.min(others.len().saturating_sub(1)));
             let mut sum = 0.0;
             let mut terms = 0;
-            for row in groups.iter().enumerate().filter(|(i, _)| own(*i)).flat_map(|(_, rows)| rows) {
-                let mut left = row.clone();
+            for member in groups.iter().enumerate().filter(|(i, _)| own(*i)).flat_map(|(_, group)| group) {
+                let mut left = member.values.clone();
                 // The functions are orthogonal.
-                for function in &functions {
-                    add_scaled(-dot(function, &left) / dot(function, function), function, &mut left);
+                for Member { values, .. } in &functions {
+                    add_scaled(-dot(values, &left) / dot(values, values), values, &mut left);
                 }
                 sum += dot(&left, &left);
                 terms += left.len();
@@ -220,9 +252,13 @@ fn what_is_left(groups: &[Vec<Vec<f64>>], count: usize) -> f64 {
 
 #[cfg(test)]
 impl Library {
-    /// The colours of a material.
-    pub(super) fn colours_of(&self, name: &str) -> [Vec<f64>; 3] {
+    /// The achromatic colour of a material at the centres.
+    pub(super) fn brightness_of(&self, name: &str) -> Vec<f64> {
         let place = self.names.iter().position(|known| known == name);
-        place.map_or_else(Default::default, |place| self.colours[place].clone())
+        place.map_or_else(Vec::new, |place| self.colours[place][0].values.clone())
+    }
+
+    pub(super) fn centres(&self) -> &[HalfDiff] {
+        self.span.centres()
     }
 }

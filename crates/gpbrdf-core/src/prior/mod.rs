@@ -3,24 +3,23 @@
 
 mod colour;
 mod file;
-mod grid;
 #[cfg(feature = "fit")]
 mod learn;
+mod span;
 
 pub use colour::Colour;
 #[cfg(feature = "fit")]
 pub(crate) use colour::to_opponent;
 pub(crate) use colour::{OPPONENT, from_opponent, variance_of_channels};
 pub(crate) use file::PriorHeader;
-pub use grid::BoxGrid;
 #[cfg(feature = "fit")]
 pub use learn::{LearnOptions, Library, learn};
+pub(crate) use span::{SPACE, Span};
 
 use std::sync::{Arc, OnceLock};
 
-use rayon::prelude::*;
-
 use crate::base::error::{Error, Result};
+use crate::base::simd::add_scaled;
 use crate::brdf::angles::HalfDiff;
 use crate::sample::LOG_EPSILON;
 use crate::sample::Transform;
@@ -33,30 +32,48 @@ use crate::sample::Transform;
 /// ones have functions of their own and no mean. With a stationary process as the rest, every colour is a Gaussian
 /// process with the covariance `B(x)^T B(x') + k(x, x')`.
 ///
-/// Functions are cubic between the nodes of a grid in the warped box ([`BoxGrid`]). They are even in `theta_h`,
-/// `theta_d` and `phi_d`, and do not depend on `phi_d` where it has no meaning, like every isotropic, reciprocal and
-/// bilateral reflectance.
+/// Functions are sums of kernels about a thousand directions. They are smooth and, like every isotropic, reciprocal
+/// and bilateral reflectance, do not depend on `phi_d` where it has no meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// The name by which reports call it.
     pub name: String,
     /// Names of the materials of the library.
     pub materials: Vec<String>,
-    grid: BoxGrid,
-    /// `m` at the nodes.
-    mean: Vec<f32>,
+    span: Span,
+    /// `m`.
+    mean: Functions,
     /// The functions of the achromatic and of the chromatic colours.
     functions: [Functions; 2],
+    /// Standard deviation of what they leave of a material that is not in the library.
+    left: [f64; 2],
 }
 
-/// The principal functions of one kind of colour.
+/// Functions of a span.
 #[derive(Clone, Debug, PartialEq)]
 struct Functions {
-    count: usize,
-    /// Values at the nodes, one row of `count` values per node.
-    nodes: Vec<f32>,
-    /// Standard deviation of what the functions leave of a material that is not in the library.
-    left: f64,
+    /// The constant of each function.
+    constants: Vec<f64>,
+    /// The coefficients of the centres, one column per function.
+    coefficients: Vec<f64>,
+}
+
+impl Functions {
+    fn count(&self) -> usize {
+        self.constants.len()
+    }
+
+    /// Values at directions, one row per direction.
+    fn values(&self, span: &Span, angles: &[HalfDiff]) -> Vec<f64> {
+        if self.count() == 0 {
+            return Vec::new();
+        }
+        let mut values = span.values(&self.coefficients, angles);
+        for row in values.chunks_mut(self.count()) {
+            row.iter_mut().zip(&self.constants).for_each(|(value, constant)| *value += constant);
+        }
+        values
+    }
 }
 
 impl Prior {
@@ -64,7 +81,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "f6eb1afb1dc66f2c8891bdfac530496a41bbf8f9a4d5058a02574f11855f8f2c";
+    pub const BUILT_IN_SHA256: &str = "0";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]
@@ -74,82 +91,71 @@ impl Prior {
     }
 
     fn new(
-        name: String,
-        materials: Vec<String>,
-        grid: BoxGrid,
-        mean: Vec<f32>,
+        (name, materials): (String, Vec<String>),
+        span: Span,
+        mean: Functions,
         functions: [Functions; 2],
+        left: [f64; 2],
     ) -> Result<Self> {
-        grid.validate()?;
-        let nodes = grid.len();
-        let fits = mean.len() == nodes && functions.iter().all(|f| f.nodes.len() == nodes * f.count);
-        if !fits {
-            let found = format!("{} values of the mean", mean.len());
-            return Err(Error::argument("functions of a prior", format!("{nodes} values each"), found));
+        let n = span.len();
+        let fits = |f: &Functions| f.coefficients.len() == n * f.count();
+        if !(mean.count() == 1 && fits(&mean) && functions.iter().all(fits)) {
+            let found = format!("{} of the mean", mean.coefficients.len());
+            return Err(Error::argument("coefficients of a prior", format!("{n} per function"), found));
         }
-        if let Some(bad) = functions.iter().map(|f| f.left).find(|left| !(*left > 0.0 && left.is_finite())) {
+        if let Some(bad) = left.iter().find(|left| !(**left > 0.0 && left.is_finite())) {
             return Err(Error::argument("rest of a prior", "a positive number", bad));
         }
-        Ok(Self { name, materials, grid, mean, functions })
-    }
-
-    /// The grid of its nodes.
-    #[must_use]
-    pub fn grid(&self) -> BoxGrid {
-        self.grid
+        Ok(Self { name, materials, span, mean, functions, left })
     }
 
     /// The number of principal functions of a kind of colour.
     #[must_use]
     pub fn n_functions(&self, colour: Colour) -> usize {
-        self.functions[colour as usize].count
+        self.functions[colour as usize].count()
     }
 
     /// Standard deviation of what the functions leave, root mean square over the warped box, of a material that is
     /// not in the library.
     #[must_use]
     pub fn left(&self, colour: Colour) -> f64 {
-        self.functions[colour as usize].left
+        self.left[colour as usize]
     }
 
-    /// The principal functions at directions, one row per direction. Cost: 64 multiply-adds per value.
+    /// The principal functions at directions, one row per direction. Cost: a kernel value for each centre, and a
+    /// multiply-add for each centre and function.
     #[must_use]
     pub fn features(&self, colour: Colour, angles: &[HalfDiff]) -> Vec<f64> {
-        let Functions { count, nodes, .. } = &self.functions[colour as usize];
-        let mut rows = vec![0.0; angles.len() * count];
-        if *count > 0 {
-            rows.par_chunks_mut(*count).zip(angles).for_each(|(row, &at)| {
-                self.grid.stencil(at).for_each(|node, weight| {
-                    let values = &nodes[node * count..(node + 1) * count];
-                    row.iter_mut().zip(values).for_each(|(out, &value)| *out += weight * f64::from(value));
-                });
-            });
-        }
-        rows
+        self.functions[colour as usize].values(&self.span, angles)
     }
 
     /// The library's mean of a colour at directions; zero for chromatic ones.
     #[must_use]
     pub fn mean(&self, colour: Colour, angles: &[HalfDiff]) -> Vec<f64> {
         match colour {
-            Colour::Achromatic => angles.iter().map(|&at| self.grid.value(&self.mean, at)).collect(),
+            Colour::Achromatic => self.mean.values(&self.span, angles),
             Colour::Chromatic => vec![0.0; angles.len()],
         }
     }
 
-    /// `m + sum_k z_k B_k` at the nodes, for the coefficients of one colour.
-    pub(crate) fn combined(&self, colour: Colour, coefficients: &[f64]) -> Vec<f64> {
-        let Functions { count, nodes, .. } = &self.functions[colour as usize];
-        let sum = |node: usize| -> f64 {
-            let row = &nodes[node * count..(node + 1) * count];
-            row.iter().zip(coefficients).map(|(b, z)| f64::from(*b) * z).sum()
-        };
-        (0..self.grid.len())
-            .map(|node| {
-                let mean = if colour == Colour::Achromatic { f64::from(self.mean[node]) } else { 0.0 };
-                mean + sum(node)
-            })
-            .collect()
+    /// The space of which its functions are part.
+    pub(crate) fn span(&self) -> &Span {
+        &self.span
+    }
+
+    /// `m + sum_k z_k B_k` for the coefficients `z` of one colour: its constant, and the coefficients of the centres.
+    pub(crate) fn combined(&self, colour: Colour, coefficients: &[f64]) -> (f64, Vec<f64>) {
+        let mut sum = (0.0, vec![0.0; self.span.len()]);
+        if colour == Colour::Achromatic {
+            sum = (self.mean.constants[0], self.mean.coefficients.clone());
+        }
+        let Functions { constants, coefficients: columns } = &self.functions[colour as usize];
+        for ((z, constant), column) in coefficients.iter().zip(constants).zip(columns.chunks(self.span.len()))
+        {
+            sum.0 += z * constant;
+            add_scaled(*z, column, &mut sum.1);
+        }
+        sum
     }
 }
 

@@ -10,7 +10,7 @@ mod targets;
 
 use std::ops::ControlFlow;
 
-use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart, Trend};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart};
 use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{Model, Transform};
 
@@ -57,9 +57,9 @@ enum Form<'a> {
     KernelSum(KernelSum<'a>, usize),
 }
 
-/// The parts of a model that shaders evaluate, and the one that the processor evaluates in every cell beforehand.
-fn parts(model: &Model) -> Result<(Vec<Part<'_>>, Option<Trend<'_>>)> {
-    let (mut parts, mut trend) = (Vec::new(), None);
+/// The parts of a model, and what is added to each channel besides its offset.
+fn parts(model: &Model) -> Result<(Vec<Part<'_>>, [f64; 3])> {
+    let (mut parts, mut constants) = (Vec::new(), [0.0; 3]);
     for (first, posterior) in model.posteriors() {
         match posterior.device_form() {
             DeviceForm::Separable(summands) => {
@@ -73,12 +73,12 @@ fn parts(model: &Model) -> Result<(Vec<Part<'_>>, Option<Trend<'_>>)> {
             DeviceForm::KernelSum(all) => {
                 let sums = all.sums.into_iter();
                 parts.extend(sums.map(|sum| Part { space: sum.space, form: Form::KernelSum(sum, first) }));
-                trend = trend.or(all.trend);
+                constants.iter_mut().zip(all.constants).for_each(|(sum, constant)| *sum += constant);
             }
             _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
         }
     }
-    Ok((parts, trend))
+    Ok((parts, constants))
 }
 
 impl Baker {
@@ -124,8 +124,8 @@ impl Baker {
             return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
         }
         let context = &self.context;
-        let (parts, trend) = parts(model)?;
-        let targets = Targets::new(context, model.space(), &parts, trend)?;
+        let (parts, constants) = parts(model)?;
+        let targets = Targets::new(context, model.space(), &parts)?;
         let mut mixed = false;
         for (i, part) in parts.iter().enumerate() {
             let share = |done: f64| (i as f64 + done) / parts.len() as f64;
@@ -145,12 +145,18 @@ impl Baker {
         if mixed {
             self.separable.finish_sigma(context, &targets)?;
         }
-        self.finish(model, &targets, texture)?;
+        self.finish(model, constants, &targets, texture)?;
         report(progress, 1.0)
     }
 
     /// Transforms targets back to sr^-1 and writes the texels.
-    fn finish(&self, model: &Model, targets: &Targets, texture: &BrdfTexture) -> Result<()> {
+    fn finish(
+        &self,
+        model: &Model,
+        constants: [f64; 3],
+        targets: &Targets,
+        texture: &BrdfTexture,
+    ) -> Result<()> {
         const WHAT: &str = "bake: texels";
         let (transform, epsilon) = match model.transform {
             Transform::Identity => (TransformKind::Identity, 0.0),
@@ -158,7 +164,7 @@ impl Baker {
             Transform::CubeRoot => (TransformKind::CubeRoot, 0.0),
             _ => return Err(Error::NoShader { what: format!("the transform {:?}", model.transform) }),
         };
-        let [r, g, b] = model.offsets.map(narrow);
+        let [r, g, b] = std::array::from_fn(|c| narrow(model.offsets[c] + constants[c]));
         let uniform = Finish {
             offsets: [r, g, b, 0.0],
             transform,

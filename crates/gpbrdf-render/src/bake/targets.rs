@@ -2,16 +2,15 @@
 
 use std::borrow::Cow;
 
-use gpbrdf_core::HalfDiff;
-use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
-use gpbrdf_core::gp::{TableGeometry, Trend};
+use gpbrdf_core::brdf::{N_PHI_D, N_THETA_D, N_THETA_H};
+use gpbrdf_core::gp::TableGeometry;
 use gpbrdf_core::sample::InputSpace;
 
 use super::separable::Placement;
 use super::{Form, Part};
 use crate::context::Context;
 use crate::error::Result;
-use crate::gpu_types::{narrow, to_u32};
+use crate::gpu_types::to_u32;
 
 /// One target for each distinct cell.
 pub(super) struct Targets {
@@ -26,13 +25,8 @@ pub(super) struct Targets {
 }
 
 impl Targets {
-    /// Targets for the sum of `parts`, or of nothing in `space`. They are those of `trend`, or zero.
-    pub(super) fn new(
-        context: &Context,
-        space: InputSpace,
-        parts: &[Part<'_>],
-        trend: Option<Trend<'_>>,
-    ) -> Result<Self> {
+    /// Targets of zero for the sum of `parts`, or of nothing in `space`.
+    pub(super) fn new(context: &Context, space: InputSpace, parts: &[Part<'_>]) -> Result<Self> {
         let space = parts.first().map_or(space, |part| part.space);
         let geometry = TableGeometry::new(space);
         let mut distinct = geometry.distinct().to_vec();
@@ -42,20 +36,8 @@ impl Targets {
         }
         let mixed = parts.iter().any(|part| matches!(part.form, Form::Separable(_, Placement::Mixed { .. })));
         let copies = if mixed { 2 } else { 1 };
-        let rows = geometry.third().len();
-        let cells = N_THETA_H * rows * N_THETA_D;
-        let storage = wgpu::BufferUsages::STORAGE;
-        let buffer = if let Some(trend) = trend {
-            let center =
-                |cell: usize| cell_center(cell / N_THETA_D / rows, cell % N_THETA_D, cell / N_THETA_D % rows);
-            let centers: Vec<HalfDiff> = (0..cells).map(center).collect();
-            let mut values: Vec<[f32; 4]> =
-                trend.values(&centers).into_iter().map(|[r, g, b]| [r, g, b, 0.0].map(narrow)).collect();
-            values.resize(copies * cells, [0.0; 4]);
-            context.buffer_of("targets", bytemuck::cast_slice(&values), storage)?
-        } else {
-            context.empty_buffer("targets", 16 * (copies * cells) as u64, storage)?
-        };
+        let cells = copies * N_THETA_H * geometry.third().len() * N_THETA_D;
+        let buffer = context.empty_buffer("targets", 16 * cells as u64, wgpu::BufferUsages::STORAGE)?;
         Ok(Self { space, geometry, distinct, buffer })
     }
 

@@ -9,12 +9,12 @@ use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::gp::dense::row_major;
 use crate::gp::hyper::{Hyper, length_scale_report};
-use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior, Trend};
+use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
 use crate::gp::scattered::ScatteredGp;
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::kernel::Kernel;
-use crate::prior::{Colour, OPPONENT, Prior, PriorHeader, from_opponent, variance_of_channels};
+use crate::prior::{Colour, OPPONENT, Prior, PriorHeader, SPACE, from_opponent, variance_of_channels};
 use crate::sample::layout::random_directions;
 use crate::sample::space::InputSpace;
 
@@ -40,9 +40,10 @@ pub(super) struct LearnedPosterior {
     prior: Arc<Prior>,
     /// Achromatic, chromatic.
     parts: [Part; 2],
-    /// The prior's mean and its functions with their posterior coefficients, at the nodes of the prior's grid: one array
-    /// per channel.
-    trends: [Vec<f32>; 3],
+    /// The prior's mean and its functions with their posterior coefficients: the constant of each channel, and the
+    /// coefficients of the prior's centres, one column per channel.
+    constants: [f64; 3],
+    trend: Vec<f64>,
 }
 
 /// The parts of a saved process that are not tensors.
@@ -120,20 +121,22 @@ impl LearnedPosterior {
             prior.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(0)),
             prior.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(1)),
         ];
-        let trends = std::array::from_fn(|c| {
-            let node = |n: usize| from_opponent([colours[0][n], colours[1][n], colours[2][n]])[c];
-            (0..prior.grid().len()).map(|n| crate::gp::table::to_f32(node(n))).collect()
-        });
-        Self { prior, parts, trends }
+        let centre = |j: usize| from_opponent(colours.each_ref().map(|(_, column)| column[j]));
+        let trend = (0..3).flat_map(|c| (0..prior.span().len()).map(move |j| (c, j)));
+        let trend = trend.map(|(c, j)| centre(j)[c]).collect();
+        let constants = from_opponent(colours.each_ref().map(|(constant, _)| *constant));
+        Self { prior, parts, constants, trend }
     }
 
     /// The part of the mean that is due to the kernels, and the prior's part.
     fn means(&self, angles: &[HalfDiff]) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
         let [bright, coloured] =
             self.parts.each_ref().map(|part| part.gp.mean_at(&points(part.space, angles)));
-        let trends = self.prior.grid().values(&self.trends, angles);
-        (0..trends.len())
-            .map(move |i| (from_opponent([bright[i], coloured[2 * i], coloured[2 * i + 1]]), trends[i]))
+        let trend = self.prior.span().values(&self.trend, angles);
+        (0..bright.len()).map(move |i| {
+            let own = from_opponent([bright[i], coloured[2 * i], coloured[2 * i + 1]]);
+            (own, std::array::from_fn(|c| self.constants[c] + trend[3 * i + c]))
+        })
     }
 
     /// The share of the prior in the variance of the mean over directions that are spread over the box.
@@ -276,7 +279,14 @@ impl Posterior for LearnedPosterior {
     }
 
     fn device_form(&self) -> DeviceForm<'_> {
-        let sums = Colour::ALL.map(|colour| {
+        let mut sums = vec![KernelSum {
+            kernel: self.prior.span().kernel(),
+            space: SPACE,
+            inputs: self.prior.span().inputs(),
+            weights: row_major(&self.trend, 3),
+            n_channels: 3,
+        }];
+        sums.extend(Colour::ALL.map(|colour| {
             let Part { gp, space, .. } = &self.parts[colour as usize];
             let rows = &OPPONENT[colour.rows()];
             // Weights of the colours become weights of the channels.
@@ -292,10 +302,7 @@ impl Posterior for LearnedPosterior {
                 weights: weights.collect(),
                 n_channels: 3,
             }
-        });
-        DeviceForm::KernelSum(KernelSums {
-            sums: sums.into(),
-            trend: Some(Trend { grid: self.prior.grid(), nodes: &self.trends }),
-        })
+        }));
+        DeviceForm::KernelSum(KernelSums { sums, constants: self.constants })
     }
 }

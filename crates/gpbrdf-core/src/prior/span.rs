@@ -1,0 +1,85 @@
+//! The smooth functions of which a prior is made.
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::base::error::{Error, Result};
+use crate::brdf::angles::{BoxPoint, HalfDiff};
+use crate::kernel::{Kernel, Points, Shape};
+use crate::sample::InputSpace;
+
+/// The space of the kernel.
+pub(crate) const SPACE: InputSpace = InputSpace::PolarAngles;
+
+/// The kernel's length scales: somewhat shorter than those that reflectances usually have.
+const LENGTHS: [f64; 3] = [0.15, 0.8, 1.2];
+
+/// The centres reach this far to the horizon, where reflectances are not known.
+const LAST_V: f64 = 0.985;
+
+/// The fewest and the most centres.
+const CENTRES: std::ops::RangeInclusive<usize> = 10..=20_000;
+
+/// All functions `c_0 + sum_j c_j k(x, x_j)` with a Matern 5/2 kernel `k` of [`InputSpace::PolarAngles`] and centres `x_j`
+/// that are spread evenly over the warped box. They are smooth, isotropic, reciprocal and bilateral.
+#[derive(Clone, Debug)]
+pub(crate) struct Span {
+    centres: Vec<HalfDiff>,
+    /// Coordinates of the centres, `n` rows.
+    inputs: Vec<f64>,
+    points: Points,
+    kernel: Kernel,
+}
+
+impl Span {
+    /// The functions of `count` centres: point `i` of an additive recurrence in the warped box. Source: M. Roberts, "The
+    /// Unreasonable Effectiveness of Quasirandom Sequences" (2018), in three dimensions.
+    ///
+    /// # Errors
+    /// Fewer than 10 centres, or more than 20,000.
+    pub(crate) fn new(count: usize) -> Result<Self> {
+        if !CENTRES.contains(&count) {
+            return Err(Error::argument("centres of a prior", "10 to 20000", count));
+        }
+        const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_900_4];
+        let centre = |i: usize| {
+            let [u, v, phi] = STEPS.map(|step| (0.5 + step * i as f64).fract());
+            BoxPoint { u, v: LAST_V * v, phi: FRAC_PI_2 * phi }.to_half_diff()
+        };
+        let centres: Vec<HalfDiff> = (0..count).map(centre).collect();
+        let inputs: Vec<f64> = centres.iter().flat_map(|&at| SPACE.coordinates(at)).collect();
+        let kernel = Kernel::ard(1.0, Shape::Matern52, &LENGTHS);
+        let points = Points::new(&inputs, &kernel.metric);
+        Ok(Self { centres, inputs, points, kernel })
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.centres.len()
+    }
+
+    pub(crate) fn centres(&self) -> &[HalfDiff] {
+        &self.centres
+    }
+
+    /// Coordinates of the centres, `n` rows.
+    pub(crate) fn inputs(&self) -> &[f64] {
+        &self.inputs
+    }
+
+    pub(crate) fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    /// Values of several functions without their constants: rows with one value per function. `coefficients` has one
+    /// column of `n` per function. Cost: `n` kernel values and `n` multiply-adds per function for each direction.
+    pub(crate) fn values(&self, coefficients: &[f64], angles: &[HalfDiff]) -> Vec<f64> {
+        let x: Vec<f64> = angles.iter().flat_map(|&at| SPACE.coordinates(at)).collect();
+        self.kernel.weighted_sums(&self.points, coefficients, &Points::new(&x, &self.kernel.metric))
+    }
+}
+
+/// Spans of the same number of centres are alike.
+impl PartialEq for Span {
+    fn eq(&self, other: &Self) -> bool {
+        self.len() == other.len()
+    }
+}
