@@ -168,9 +168,13 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
                 own
             })
             .collect();
-        let all: Vec<&Member> = groups.iter().flatten().collect();
-        left[colour as usize] = what_is_left(&groups, wanted);
-        let principal = principal_functions(&all, wanted.min(count - 1));
+        // What functions of other materials leave of a material is part of what is expected of an unknown one.
+        let (rests, rest) = what_is_left(&groups, wanted);
+        left[colour as usize] = rest;
+        let members: Vec<&Member> = groups.iter().flatten().collect();
+        let deviations = members.len() as f64;
+        let all: Vec<&Member> = members.into_iter().chain(&rests).collect();
+        let principal = principal_functions(&all, deviations, wanted.min(count - 1));
         Functions {
             constants: principal.iter().map(|f| rounded(f.constant)).collect(),
             coefficients: principal.iter().flat_map(|f| &f.coefficients).copied().map(rounded).collect(),
@@ -197,9 +201,9 @@ impl Member {
     }
 }
 
-/// The first principal functions of members about zero, each times its standard deviation; fewer where the members do
-/// not span as many.
-fn principal_functions(members: &[&Member], count: usize) -> Vec<Member> {
+/// The first principal functions of members about zero, each times its standard deviation, whose square is the sum of
+/// squares over all members divided by `divisor`; fewer where the members do not span as many.
+fn principal_functions(members: &[&Member], divisor: f64, count: usize) -> Vec<Member> {
     let (n, length) = (members.len(), members.first().map_or(0, |member| member.values.len()));
     let all: Vec<f64> = members.iter().flat_map(|member| &member.values).copied().collect();
     let columns = view_slice(&all, length, n);
@@ -209,45 +213,48 @@ fn principal_functions(members: &[&Member], count: usize) -> Vec<Member> {
     order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
     let largest = values[order[0]].max(f64::MIN_POSITIVE);
     let kept = order.into_iter().take(count).filter(|&k| values[k] > 1e-9 * largest);
-    // The combination with eigenvector v has the length sqrt(value): divided by sqrt(n), the standard deviation.
+    // The combination with eigenvector v has the length sqrt(value).
     kept.map(|k| {
         let mut function =
             Member { values: vec![0.0; length], constant: 0.0, coefficients: vec![0.0; length] };
         for (i, member) in members.iter().enumerate() {
-            function.add(vectors[(i, k)] / (n as f64).sqrt(), member);
+            function.add(vectors[(i, k)] / divisor.sqrt(), member);
         }
         function
     })
     .collect()
 }
 
-/// Root mean square of what the functions of the other groups leave of each group, one part of the groups at a time.
-fn what_is_left(groups: &[Vec<Member>], count: usize) -> f64 {
+/// What the functions of the other groups leave of each member, one part of the groups at a time, and its root mean
+/// square over the centres.
+fn what_is_left(groups: &[Vec<Member>], count: usize) -> (Vec<Member>, f64) {
     let folds = FOLDS.min(groups.len());
-    let (sum, terms) = (0..folds)
+    let rests: Vec<Member> = (0..folds)
         .into_par_iter()
-        .map(|fold| {
+        .flat_map_iter(|fold| {
             let own = |i: usize| i % folds == fold;
-            let others: Vec<&Member> =
-                groups.iter().enumerate().filter(|(i, _)| !own(*i)).flat_map(|(_, group)| group).collect();
-            let functions = principal_functions(&others, count.min(others.len().saturating_sub(1)));
-            let mut sum = 0.0;
-            let mut terms = 0;
-            for member in groups.iter().enumerate().filter(|(i, _)| own(*i)).flat_map(|(_, group)| group) {
-                let mut left = member.values.clone();
+            let group = |inside: bool| {
+                let groups = groups.iter().enumerate().filter(move |(i, _)| own(*i) == inside);
+                groups.flat_map(|(_, group)| group)
+            };
+            let others: Vec<&Member> = group(false).collect();
+            let divisor = others.len() as f64;
+            let functions = principal_functions(&others, divisor, count.min(others.len().saturating_sub(1)));
+            let rest = |member: &Member| {
+                let mut left = member.clone();
                 // The functions are orthogonal.
-                for Member { values, .. } in &functions {
-                    add_scaled(-dot(values, &left) / dot(values, values), values, &mut left);
+                for function in &functions {
+                    let square = dot(&function.values, &function.values);
+                    left.add(-dot(&function.values, &left.values) / square, function);
                 }
-                sum += dot(&left, &left);
-                terms += left.len();
-            }
-            (sum, terms)
+                left
+            };
+            group(true).map(rest).collect::<Vec<_>>()
         })
-        .collect::<Vec<_>>()
-        .into_iter()
-        .fold((0.0, 0), |(a, m), (b, n)| (a + b, m + n));
-    (sum / terms.max(1) as f64).sqrt().max(1e-3)
+        .collect();
+    let squares: f64 = rests.iter().map(|rest| dot(&rest.values, &rest.values)).sum();
+    let terms: usize = rests.iter().map(|rest| rest.values.len()).sum();
+    (rests, (squares / terms.max(1) as f64).sqrt().max(1e-3))
 }
 
 #[cfg(test)]

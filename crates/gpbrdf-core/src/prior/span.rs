@@ -2,9 +2,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use rayon::prelude::*;
+
 use crate::base::error::{Error, Result};
+use crate::base::linalg::{product_into_slice, view_slice};
 use crate::brdf::angles::{BoxPoint, HalfDiff};
-use crate::kernel::{Kernel, Points, Shape};
+use crate::kernel::{Kernel, Points, RowScratch, Shape};
 use crate::sample::InputSpace;
 
 /// The space of the kernel.
@@ -15,6 +18,9 @@ const LENGTHS: [f64; 3] = [0.15, 0.8, 1.2];
 
 /// The centres reach this far to the horizon, where reflectances are not known.
 const LAST_V: f64 = 0.985;
+
+/// Number of directions of a parallel task.
+const BLOCK: usize = 64;
 
 /// The fewest and the most centres.
 const CENTRES: std::ops::RangeInclusive<usize> = 10..=20_000;
@@ -73,7 +79,26 @@ impl Span {
     /// column of `n` per function. Cost: `n` kernel values and `n` multiply-adds per function for each direction.
     pub(crate) fn values(&self, coefficients: &[f64], angles: &[HalfDiff]) -> Vec<f64> {
         let x: Vec<f64> = angles.iter().flat_map(|&at| SPACE.coordinates(at)).collect();
-        self.kernel.weighted_sums(&self.points, coefficients, &Points::new(&x, &self.kernel.metric))
+        let at = Points::new(&x, &self.kernel.metric);
+        let n = self.len();
+        let count = coefficients.len() / n;
+        let mut out = vec![0.0; angles.len() * count];
+        if count == 0 {
+            return out;
+        }
+        let columns = view_slice(coefficients, n, count);
+        out.par_chunks_mut(BLOCK * count).enumerate().for_each_init(
+            || (RowScratch::new(self.kernel.dimension()), vec![0.0; BLOCK * n]),
+            |(scratch, rows), (block, out)| {
+                let rows = &mut rows[..out.len() / count * n];
+                for (row, j) in rows.chunks_mut(n).zip(block * BLOCK..) {
+                    self.kernel.row(&self.points, 0..n, &at, j, scratch, row);
+                }
+                let rows = view_slice(rows, n, out.len() / count);
+                product_into_slice(out, columns.transpose(), rows);
+            },
+        );
+        out
     }
 }
 

@@ -1,1 +1,142 @@
+use nalgebra::{DMatrix, DVector};
 
+use crate::brdf::{HalfDiff, material, materials};
+use crate::model::{FitOptions, IntervalOf, Model, PriorChoice, condition, fit};
+use crate::prior::{Colour, LearnOptions, Library, Prior, learn, to_opponent, variance_of_channels};
+use crate::sample::{Layout, SampleSet};
+use std::sync::Arc;
+
+/// What the built-in materials but `left_out` have in common.
+fn prior(left_out: &str) -> Arc<Prior> {
+    let mut library = Library::new(200).unwrap();
+    for material in materials().iter().filter(|m| m.name != left_out) {
+        library.add(material.name, &material.brdf);
+    }
+    Arc::new(learn("test", &library, &LearnOptions { functions: [8, 5] }).unwrap())
+}
+
+fn samples(name: &str, count: usize) -> SampleSet {
+    SampleSet::measure(&material(name).unwrap().brdf, &Layout::Hemisphere { count, seed: 4 }).unwrap()
+}
+
+fn options(prior: &Arc<Prior>) -> FitOptions {
+    FitOptions { prior: PriorChoice::Learned(Arc::clone(prior)), ..FitOptions::default() }
+}
+
+/// Directions near and far from the mirror direction.
+fn test_angles() -> Vec<HalfDiff> {
+    let at = |(theta_h, theta_d, phi_d)| HalfDiff { theta_h, theta_d, phi_d };
+    [(0.0, 0.3, 0.0), (0.05, 0.9, 1.0), (0.6, 0.1, 2.0), (0.9, 0.5, 1.5), (0.3, 0.7, 0.2)].map(at).to_vec()
+}
+
+/// Mean and variance beside the formula with explicit matrices: `K = k + v B B^T + noise`.
+#[test]
+fn predictions_are_those_of_the_kernel_with_a_basis() {
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 40));
+    let fitted = fit(&samples, &options(&prior)).unwrap();
+    let hyper = fitted.model.hyper().unwrap();
+    let test = test_angles();
+    let n = samples.len();
+    // Means and variances of each colour.
+    let mut expected = [vec![[0.0; 3]; test.len()], vec![[0.0; 3]; test.len()]];
+    let mut log_likelihood = 0.0;
+    for (colour, own) in Colour::ALL.into_iter().zip([&hyper, hyper.chromatic.as_ref().unwrap()]) {
+        let space = own.space.unwrap();
+        let x: Vec<[f64; 3]> = samples.angles.iter().map(|&at| space.coordinates(at)).collect();
+        let to: Vec<[f64; 3]> = test.iter().map(|&at| space.coordinates(at)).collect();
+        let count = prior.n_functions(colour);
+        let b = DMatrix::from_row_slice(n, count, &prior.features(colour, &samples.angles));
+        let b_test = DMatrix::from_row_slice(test.len(), count, &prior.features(colour, &test));
+        let v = own.basis_variance.unwrap();
+        let noise = DMatrix::identity(n, n) * own.noise_variance;
+        let k = DMatrix::from_fn(n, n, |i, j| own.kernel.value(&x[i], &x[j])) + &b * b.transpose() * v + noise;
+        let cross = DMatrix::from_fn(test.len(), n, |i, j| own.kernel.value(&to[i], &x[j]))
+            + &b_test * b.transpose() * v;
+        let factor = k.cholesky().unwrap();
+        let explained = &cross * factor.solve(&cross.transpose());
+        let (mean, mean_test) = (prior.mean(colour, &samples.angles), prior.mean(colour, &test));
+        for row in colour.rows() {
+            let y = DVector::from_fn(n, |i, _| {
+                let f = samples.values[i].map(|f| Prior::TRANSFORM.forward(f));
+                to_opponent(f)[row] - mean[i]
+            });
+            let weights = factor.solve(&y);
+            let predicted = &cross * &weights;
+            log_likelihood -= 0.5
+                * (y.dot(&weights)
+                    + 2.0 * factor.l().diagonal().map(f64::ln).sum()
+                    + n as f64 * std::f64::consts::TAU.ln());
+            for j in 0..test.len() {
+                expected[0][j][row] = mean_test[j] + predicted[j];
+                let own_row = b_test.row(j);
+                expected[1][j][row] =
+                    own.kernel.prior_variance() + v * own_row.dot(&own_row) - explained[(j, j)];
+            }
+        }
+    }
+    let found = fitted.model.predict_target(&test);
+    let variances = fitted.model.predict_variance(&test, IntervalOf::Latent).unwrap();
+    for j in 0..test.len() {
+        let colours = to_opponent(found[j]);
+        for c in 0..3 {
+            assert!((colours[c] - expected[0][j][c]).abs() < 1e-4, "{j}: {colours:?} {:?}", expected[0][j]);
+        }
+        let variance = variance_of_channels(expected[1][j][0], expected[1][j][1]);
+        assert!((variances[j][0] / variance - 1.0).abs() < 1e-3, "{j}: {} {variance}", variances[j][0]);
+    }
+    let reported = fitted.reports[0].log_marginal_likelihood;
+    assert!((reported / log_likelihood - 1.0).abs() < 5e-3, "{reported} {log_likelihood}");
+}
+
+#[test]
+fn models_come_back_from_files_and_from_their_hyper_parameters() {
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 60));
+    let options = options(&prior);
+    let fitted = fit(&samples, &options).unwrap().model;
+    let test = test_angles();
+    let loaded = Model::from_bytes(&fitted.to_bytes().unwrap(), "m").unwrap();
+    assert_eq!(loaded.predict_target(&test), fitted.predict_target(&test));
+    let variance = |model: &Model| model.predict_variance(&test, IntervalOf::Latent).unwrap();
+    for (a, b) in variance(&loaded).iter().zip(variance(&fitted)) {
+        assert!((a[0] / b[0] - 1.0).abs() < 1e-9, "{a:?} {b:?}");
+    }
+    let again = condition(&samples, &options, &fitted.hyper().unwrap()).unwrap().model;
+    assert_eq!(again.predict_target(&test), fitted.predict_target(&test));
+    let report = fitted.hyper_report();
+    let share = report["share_of_prior"].as_f64().unwrap();
+    assert!((0.1..=1.0).contains(&share) && report["prior"] == "test", "{report}");
+}
+
+/// Twenty measurements of a plastic among other materials: better with what these have in common.
+#[test]
+fn a_prior_helps_where_measurements_are_few() {
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 20));
+    let truth = material("red-plastic").unwrap();
+    let layout = Layout::Hemisphere { count: 500, seed: 77 };
+    let others = SampleSet::measure(&truth.brdf, &layout).unwrap();
+    let error = |options: &FitOptions| {
+        let model = fit(&samples, options).unwrap().model;
+        let log = |f: f64| Prior::TRANSFORM.forward(f);
+        let mut errors: Vec<f64> = (model.predict_mean(&others.angles).iter().zip(&others.values))
+            .map(|(a, b)| (log(a[0]) - log(b[0])).abs())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() / 2]
+    };
+    let without = FitOptions { prior: PriorChoice::None, ..FitOptions::default() };
+    let (with, without) = (error(&options(&prior)), error(&without));
+    assert!(with < 0.7 * without, "{with} {without}");
+}
+
+#[test]
+fn a_pair_turned_about_the_normal_has_the_same_value() {
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 30));
+    let model = fit(&samples, &options(&prior)).unwrap().model;
+    for (theta_h, theta_d) in [(0.0, 0.5), (0.6, 0.0)] {
+        let turned = [0.0, 0.7, 2.9].map(|phi_d| HalfDiff { theta_h, theta_d, phi_d });
+        let values = model.predict_mean(&turned);
+        for value in &values[1..] {
+            assert!((value[0] / values[0][0] - 1.0).abs() < 1e-9, "{values:?}");
+        }
+    }
+}

@@ -76,6 +76,16 @@ pub(super) fn leave_one_out(process: &Process<'_>, y: &[Vec<f64>]) -> Result<(Ve
     Ok((residuals.collect(), variances))
 }
 
+/// `K^-1 y` of every channel, one after the other.
+///
+/// # Errors
+/// A covariance that is not positive definite.
+pub(super) fn weights(process: &Process<'_>, y: &[Vec<f64>]) -> Result<Vec<f64>> {
+    let mut weights = y.concat();
+    solve(&factor(process)?, process.noise.len(), &mut weights);
+    Ok(weights)
+}
+
 /// The Cholesky factor of the covariance of all measurements.
 fn factor(process: &Process<'_>) -> Result<Vec<f64>> {
     let n = process.noise.len();

@@ -12,7 +12,7 @@ use super::product::Covariance;
 use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
-use crate::base::simd::dot;
+use crate::base::simd::{add_scaled, dot};
 use crate::gp::problem::{BasisTerm, Outliers, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
@@ -370,6 +370,29 @@ impl State {
     /// Known hyper-parameters, with all samples of weight 1.
     pub(super) fn known(kernel: Kernel, noise_variance: f64, basis_variance: f64, data: &Data) -> Self {
         Self { kernel, noise_variance, basis_variance, weights: vec![1.0; data.len()] }
+    }
+
+    /// The posterior mean of the coefficients of the basis, `v b(X)^T K^-1 y`, of each channel, for few samples.
+    ///
+    /// # Errors
+    /// A covariance that is not positive definite.
+    pub(super) fn basis_coefficients(&self, data: &Data) -> Result<Vec<Vec<f64>>> {
+        let (_, all) = data.noise(self.noise_variance, &self.weights);
+        let weights = exact::weights(&self.process(data, &all), &data.y)?;
+        let of_channel = |weights: &[f64]| {
+            let mut sum = vec![0.0; data.basis.count];
+            for (i, weight) in weights.iter().enumerate() {
+                add_scaled(self.basis_variance * weight, data.basis.row(i), &mut sum);
+            }
+            sum
+        };
+        Ok(weights.chunks(data.len().max(1)).map(of_channel).collect())
+    }
+
+    /// The same hyper-parameters and weights for other data of the same samples, with a variance of the basis.
+    pub(super) fn moved(self, from: &Data, to: &Data, basis_variance: f64) -> Self {
+        let given = from.as_given(&self.weights, 1);
+        Self { weights: to.order().map(|i| given[i]).collect(), basis_variance, ..self }
     }
 
     /// The process with this noise variance of each sample.

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use super::ScatteredGp;
 use super::fit::{Data, Search, State};
 use super::posterior::ScatteredPosterior;
+use super::{ScatteredGp, exact};
 use crate::base::error::{Error, Result};
+use crate::base::simd::dot;
+use crate::brdf::angles::HalfDiff;
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
-use crate::gp::problem::{Fitted, Problem};
+use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
 use crate::sample::space::InputSpace;
 
@@ -30,6 +32,25 @@ pub(crate) struct Conditioned {
 /// Like [`fit`], with a basis if the problem has one.
 pub(crate) fn fit_process(problem: &Problem<'_>) -> Result<(Conditioned, FitReport)> {
     problem.noise.validate()?;
+    let Found { data, state, space, mut report } = match problem.basis {
+        Some(basis) if problem.angles.len() > exact::MOST_SAMPLES => search_with_basis(problem, basis)?,
+        _ => search(problem)?,
+    };
+    let (gp, value) = state.condition(problem, &data)?;
+    report.log_marginal_likelihood = value;
+    Ok((Conditioned { gp, space, order: data.order().collect() }, report))
+}
+
+/// Hyper-parameters and weights, what was searched, and how.
+struct Found {
+    data: Data,
+    state: State,
+    space: InputSpace,
+    report: FitReport,
+}
+
+/// Finds hyper-parameters in each of the spaces to choose from and follows those of the largest likelihood.
+fn search(problem: &Problem<'_>) -> Result<Found> {
     let spaces = problem.space.map_or(InputSpace::ISOTROPIC.to_vec(), |space| vec![space]);
     let mut evaluations = 0;
     let mut best: Option<Search<'_>> = None;
@@ -47,10 +68,40 @@ pub(crate) fn fit_process(problem: &Problem<'_>) -> Result<(Conditioned, FitRepo
     let space = best.space;
     let (data, state, mut report) = best.finish()?;
     state.report_samples(&data, &mut report);
-    let (gp, value) = state.condition(problem, &data)?;
-    report.log_marginal_likelihood = value;
     report.evaluations += evaluations;
-    Ok((Conditioned { gp, space, order: data.order().collect() }, report))
+    Ok(Found { data, state, space, report })
+}
+
+/// Like [`search`] for many samples with a basis, which correlates all of them, so that neighbours do not tell its
+/// coefficients: these and the variance of the basis come from 512 samples, space, kernel and noise from what they leave
+/// of all samples.
+fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Found> {
+    let first = problem.space.unwrap_or(InputSpace::ISOTROPIC[0]);
+    let some: Vec<usize> = data(problem, first)?.order().take(exact::MOST_SAMPLES).collect();
+    let pick = |values: &[f64]| some.iter().filter_map(|&i| values.get(i).copied()).collect::<Vec<f64>>();
+    let row = |i: usize| &basis.rows[i * basis.count..(i + 1) * basis.count];
+    let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();
+    let rows: Vec<f64> = some.iter().flat_map(|&i| row(i)).copied().collect();
+    let known_noise = pick(problem.known_noise);
+    let few = search(&Problem {
+        angles: &angles,
+        targets: problem.targets.iter().map(|y| pick(y)).collect(),
+        known_noise: &known_noise,
+        basis: Some(BasisTerm { rows: &rows, ..basis }),
+        ..problem.clone()
+    })?;
+    let coefficients = few.state.basis_coefficients(&few.data)?;
+    let left =
+        |(y, z): (&Vec<f64>, &Vec<f64>)| y.iter().enumerate().map(|(i, y)| y - dot(row(i), z)).collect();
+    let rest = search(&Problem {
+        targets: problem.targets.iter().zip(&coefficients).map(left).collect(),
+        basis: None,
+        ..problem.clone()
+    })?;
+    let data = data(problem, rest.space)?;
+    let state = rest.state.moved(&rest.data, &data, few.state.basis_variance);
+    let evaluations = rest.report.evaluations + few.report.evaluations;
+    Ok(Found { data, state, space: rest.space, report: FitReport { evaluations, ..rest.report } })
 }
 
 /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
