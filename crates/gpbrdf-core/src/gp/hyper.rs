@@ -33,13 +33,24 @@ pub struct Hyper {
     /// achromatic one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chromatic: Option<Box<Hyper>>,
+    /// The weights of the library's materials in a learned prior; empty where none is used, or all weigh the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub library_weights: Vec<f64>,
 }
 
 impl Hyper {
     /// Hyper-parameters that all channels share, without a learned prior.
     #[must_use]
     pub fn new(solver: Solver, kernel: Kernel, noise_variance: f64, space: Option<InputSpace>) -> Self {
-        Self { solver, kernel, noise_variance, space, basis_variance: None, chromatic: None }
+        Self {
+            solver,
+            kernel,
+            noise_variance,
+            space,
+            basis_variance: None,
+            chromatic: None,
+            library_weights: Vec::new(),
+        }
     }
 }
 

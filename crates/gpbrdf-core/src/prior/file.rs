@@ -46,7 +46,7 @@ impl Prior {
     }
 
     /// The bytes of a file: the tensors `mean`, `achromatic` and `chromatic` in single precision, with one row per
-    /// function: its constant, then the coefficients of the centres.
+    /// function: its constant, then the coefficients of the centres; `scores` with one row per material.
     ///
     /// # Errors
     /// Numbers that JSON cannot hold.
@@ -76,7 +76,7 @@ impl Prior {
     }
 
     /// Names, shapes and values of the tensors.
-    fn tensors(&self) -> [(&'static str, [usize; 2], Vec<f64>); 3] {
+    fn tensors(&self) -> [(&'static str, [usize; 2], Vec<f64>); 4] {
         let n = self.span.len();
         let of = |name, functions: &Functions| {
             let rows = functions.constants.iter().zip(functions.coefficients.chunks(n));
@@ -85,7 +85,8 @@ impl Prior {
             (name, [functions.count(), 1 + n], values)
         };
         let [bright, coloured] = &self.functions;
-        [of(NAMES[0], &self.mean), of(NAMES[1], bright), of(NAMES[2], coloured)]
+        let scores = (NAMES[3], [self.materials.len(), bright.count()], self.scores.clone());
+        [of(NAMES[0], &self.mean), of(NAMES[1], bright), of(NAMES[2], coloured), scores]
     }
 
     /// Adds the tensors to those of a model, and returns the rest.
@@ -118,7 +119,8 @@ impl Prior {
             })
         };
         let [bright, coloured] = [read(NAMES[1])?, read(NAMES[2])?].map(functions);
-        Self::new((header.name, header.materials), span, functions(mean)?, [bright?, coloured?], header.left)
+        let names = (header.name, header.materials);
+        Self::new(names, span, functions(mean)?, [bright?, coloured?], header.left, read(NAMES[3])?)
     }
 
     /// Reads a prior.
@@ -174,4 +176,4 @@ impl Prior {
 }
 
 /// Names of the tensors.
-const NAMES: [&str; 3] = ["mean", "achromatic", "chromatic"];
+const NAMES: [&str; 4] = ["mean", "achromatic", "chromatic", "scores"];

@@ -153,7 +153,7 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
     let n = library.span.len();
     let mut mean = Member { values: vec![0.0; n], constant: 0.0, coefficients: vec![0.0; n] };
     library.colours.iter().for_each(|[bright, ..]| mean.add(1.0 / count as f64, bright));
-    let mut left = [0.0; 2];
+    let (mut left, mut scores) = ([0.0; 2], Vec::new());
     let functions = Colour::ALL.map(|colour| {
         let wanted = options.functions[colour as usize];
         // A group of one or two functions for each material.
@@ -175,6 +175,12 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
         let deviations = members.len() as f64;
         let all: Vec<&Member> = members.into_iter().chain(&rests).collect();
         let principal = principal_functions(&all, deviations, wanted.min(count - 1));
+        if colour == Colour::Achromatic {
+            let score =
+                |member: &Member, f: &Member| dot(&member.values, &f.values) / dot(&f.values, &f.values);
+            let rows = groups.iter().flatten();
+            scores = rows.flat_map(|member| principal.iter().map(|f| rounded(score(member, f)))).collect();
+        }
         Functions {
             constants: principal.iter().map(|f| rounded(f.constant)).collect(),
             coefficients: principal.iter().flat_map(|f| &f.coefficients).copied().map(rounded).collect(),
@@ -184,7 +190,7 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
         constants: vec![rounded(mean.constant)],
         coefficients: mean.coefficients.into_iter().map(rounded).collect(),
     };
-    Prior::new((name.to_owned(), library.names.clone()), library.span.clone(), mean, functions, left)
+    Prior::new((name.to_owned(), library.names.clone()), library.span.clone(), mean, functions, left, scores)
 }
 
 /// The nearest number in single precision.

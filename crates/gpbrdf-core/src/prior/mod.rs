@@ -19,10 +19,14 @@ pub(crate) use span::{SPACE, Span};
 use std::sync::{Arc, OnceLock};
 
 use crate::base::error::{Error, Result};
+use crate::base::linalg::factorize;
 use crate::base::simd::add_scaled;
 use crate::brdf::angles::HalfDiff;
 use crate::sample::LOG_EPSILON;
 use crate::sample::Transform;
+
+/// The share of the library's materials in the covariance of an adapted prior; the rest is that of the prior itself.
+const KEPT: f64 = 0.9;
 
 /// A prior of `ln(f + 1e-3)`, learned from a library of materials.
 ///
@@ -47,6 +51,8 @@ pub struct Prior {
     functions: [Functions; 2],
     /// Standard deviation of what they leave of a material that is not in the library.
     left: [f64; 2],
+    /// The coefficients `z` of the achromatic colour of each material of the library, one row per material.
+    scores: Vec<f64>,
 }
 
 /// Functions of a span.
@@ -96,6 +102,7 @@ impl Prior {
         mean: Functions,
         functions: [Functions; 2],
         left: [f64; 2],
+        scores: Vec<f64>,
     ) -> Result<Self> {
         let n = span.len();
         let fits = |f: &Functions| f.coefficients.len() == n * f.count();
@@ -103,10 +110,14 @@ impl Prior {
             let found = format!("{} of the mean", mean.coefficients.len());
             return Err(Error::argument("coefficients of a prior", format!("{n} per function"), found));
         }
+        if scores.len() != materials.len() * functions[0].count() {
+            let expected = format!("{} for each of {} materials", functions[0].count(), materials.len());
+            return Err(Error::argument("scores of a prior", expected, scores.len()));
+        }
         if let Some(bad) = left.iter().find(|left| !(**left > 0.0 && left.is_finite())) {
             return Err(Error::argument("rest of a prior", "a positive number", bad));
         }
-        Ok(Self { name, materials, span, mean, functions, left })
+        Ok(Self { name, materials, span, mean, functions, left, scores })
     }
 
     /// The number of principal functions of a kind of colour.
@@ -136,6 +147,59 @@ impl Prior {
             Colour::Achromatic => self.mean.values(&self.span, angles),
             Colour::Chromatic => vec![0.0; angles.len()],
         }
+    }
+
+    /// The coefficients `z` of the achromatic colour of the materials of the library, one row per material.
+    #[cfg(feature = "fit")]
+    pub(crate) fn scores(&self) -> impl Iterator<Item = &[f64]> {
+        self.scores.chunks(self.n_functions(Colour::Achromatic).max(1))
+    }
+
+    /// The prior of materials that are like those with large weights: for the achromatic colour `z ~ N(mu, S)` with the
+    /// weighted mean `mu` of the coefficients of the library's materials and `S = 0.9 C + 0.1 I`, where `C` is their
+    /// weighted covariance. The functions are changed so that their coefficients are standard normal again.
+    ///
+    /// # Errors
+    /// A number of weights that is not that of the materials, or weights that are negative, not finite or all zero.
+    pub fn adapted(&self, weights: &[f64]) -> Result<Self> {
+        let count = self.n_functions(Colour::Achromatic);
+        let sum: f64 = weights.iter().sum();
+        let is_usable = weights.iter().all(|w| *w >= 0.0) && sum > 0.0 && sum.is_finite();
+        if weights.len() != self.materials.len() || !is_usable || count == 0 {
+            let expected = format!("{}, of at least 0 and not all zero", self.materials.len());
+            return Err(Error::argument("weights of materials", expected, format!("{weights:?}")));
+        }
+        let rows = || self.scores.chunks(count).zip(weights).map(|(row, w)| (row, w / sum));
+        let mut mean = vec![0.0; count];
+        rows().for_each(|(row, w)| add_scaled(w, row, &mut mean));
+        let mut covariance = vec![0.0; count * count];
+        for (row, w) in rows() {
+            for (j, column) in covariance.chunks_mut(count).enumerate() {
+                let own = KEPT * w * (row[j] - mean[j]);
+                column.iter_mut().zip(row).zip(&mean).for_each(|((out, z), m)| *out += own * (z - m));
+            }
+        }
+        covariance.iter_mut().step_by(count + 1).for_each(|diagonal| *diagonal += 1.0 - KEPT);
+        if !factorize(&mut covariance, count) {
+            return Err(Error::NotPositiveDefinite { size: count, largest_jitter: 1.0 - KEPT });
+        }
+        let n = self.span.len();
+        let Functions { constants, coefficients } = &self.functions[Colour::Achromatic as usize];
+        let mut changed = Functions { constants: vec![0.0; count], coefficients: vec![0.0; n * count] };
+        for (k, column) in changed.coefficients.chunks_mut(n).enumerate() {
+            // Column k of the Cholesky factor.
+            for j in k..count {
+                let l = covariance[k * count + j];
+                changed.constants[k] += l * constants[j];
+                add_scaled(l, &coefficients[j * n..(j + 1) * n], column);
+            }
+        }
+        let (constant, coefficients) = self.combined(Colour::Achromatic, &mean);
+        Ok(Self {
+            mean: Functions { constants: vec![constant], coefficients },
+            functions: [changed, self.functions[Colour::Chromatic as usize].clone()],
+            ..self.clone()
+        })
     }
 
     /// The space of which its functions are part.

@@ -37,7 +37,10 @@ pub(super) struct Part {
 /// The processes of both kinds of colour, and what they share.
 #[derive(Debug)]
 pub(super) struct LearnedPosterior {
+    /// The prior of all materials, and the weights of its materials in the one that is used.
     prior: Arc<Prior>,
+    weights: Vec<f64>,
+    adapted: Arc<Prior>,
     /// Achromatic, chromatic.
     parts: [Part; 2],
     /// The prior's mean and its functions with their posterior coefficients: the constant of each channel, and the
@@ -50,6 +53,8 @@ pub(super) struct LearnedPosterior {
 #[derive(Serialize, Deserialize)]
 struct Header {
     prior: SavedPrior,
+    #[serde(default)]
+    library_weights: Vec<f64>,
     parts: [PartHeader; 2],
 }
 
@@ -75,7 +80,7 @@ const PARTS: [&str; 2] = ["achromatic", "chromatic"];
 
 /// Reads a process that [`Posterior::save`] has written.
 pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
-    let Header { prior, parts } = tensors.header(header)?;
+    let Header { prior, library_weights, parts } = tensors.header(header)?;
     let prior = match prior {
         SavedPrior::BuiltIn { sha256 } if sha256 == Prior::BUILT_IN_SHA256 => Prior::built_in(),
         SavedPrior::BuiltIn { sha256 } => {
@@ -86,6 +91,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
             Arc::new(Prior::from_tensors(header, tensors).map_err(|e| tensors.damaged(e))?)
         }
     };
+    let adapted = adapted(&prior, &library_weights).map_err(|e| tensors.damaged(e))?;
     let mut made = Vec::new();
     for ((name, colour), header) in PARTS.into_iter().zip(Colour::ALL).zip(parts) {
         header.space.validate().map_err(|e| tensors.damaged(e))?;
@@ -102,30 +108,40 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
             rows.iter().map(|&[theta_h, theta_d, phi_d]| HalfDiff { theta_h, theta_d, phi_d }).collect();
         let PartHeader { space, kernel, noise_variance, basis_variance } = header;
         let points = angles.iter().flat_map(|&at| space.coordinates(at)).collect();
-        let basis = (prior.features(colour, &angles), prior.n_functions(colour), basis_variance);
+        let basis = (adapted.features(colour, &angles), adapted.n_functions(colour), basis_variance);
         let channels = colour.rows().len();
         let gp = ScatteredGp::with_basis(kernel, noise_variance, noise, points, basis, channels, weights);
         made.push(Part { gp: gp.map_err(|e| tensors.damaged(e))?, space, angles });
     }
     match <[Part; 2]>::try_from(made) {
-        Ok(parts) => Ok(Arc::new(LearnedPosterior::new(prior, parts))),
+        Ok(parts) => Ok(Arc::new(LearnedPosterior::new(prior, (library_weights, adapted), parts))),
         Err(_) => Err(tensors.wrong("processes of two kinds of colours", "others")),
     }
 }
 
+/// The prior with these weights of its materials; as it is where there are none.
+pub(super) fn adapted(prior: &Arc<Prior>, weights: &[f64]) -> Result<Arc<Prior>> {
+    Ok(if weights.is_empty() { Arc::clone(prior) } else { Arc::new(prior.adapted(weights)?) })
+}
+
 impl LearnedPosterior {
-    pub(super) fn new(prior: Arc<Prior>, parts: [Part; 2]) -> Self {
+    /// A process with a prior, the weights of its materials and the prior that these lead to.
+    pub(super) fn new(
+        prior: Arc<Prior>,
+        (weights, adapted): (Vec<f64>, Arc<Prior>),
+        parts: [Part; 2],
+    ) -> Self {
         let [bright, coloured] = &parts;
         let colours = [
-            prior.combined(Colour::Achromatic, &bright.gp.basis_coefficients(0)),
-            prior.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(0)),
-            prior.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(1)),
+            adapted.combined(Colour::Achromatic, &bright.gp.basis_coefficients(0)),
+            adapted.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(0)),
+            adapted.combined(Colour::Chromatic, &coloured.gp.basis_coefficients(1)),
         ];
         let centre = |j: usize| from_opponent(colours.each_ref().map(|(_, column)| column[j]));
         let trend = (0..3).flat_map(|c| (0..prior.span().len()).map(move |j| (c, j)));
         let trend = trend.map(|(c, j)| centre(j)[c]).collect();
         let constants = from_opponent(colours.each_ref().map(|(constant, _)| *constant));
-        Self { prior, parts, constants, trend }
+        Self { prior, weights, adapted, parts, constants, trend }
     }
 
     /// The part of the mean that is due to the kernels, and the prior's part.
@@ -219,7 +235,7 @@ impl Posterior for LearnedPosterior {
         }
         let [bright, coloured] = Colour::ALL.map(|colour| {
             let Part { gp, space, .. } = &self.parts[colour as usize];
-            gp.variance_at(&points(*space, angles), &self.prior.features(colour, angles))
+            gp.variance_at(&points(*space, angles), &self.adapted.features(colour, angles))
         });
         Ok(bright.into_iter().zip(coloured).map(|(a, c)| variance_of_channels(a, c)).collect())
     }
@@ -229,7 +245,7 @@ impl Posterior for LearnedPosterior {
             basis_variance: Some(gp.basis_variance()),
             ..Hyper::new(Solver::Scattered, gp.kernel().clone(), gp.noise_variance(), Some(*space))
         });
-        Some(Hyper { chromatic: Some(Box::new(coloured)), ..bright })
+        Some(Hyper { chromatic: Some(Box::new(coloured)), library_weights: self.weights.clone(), ..bright })
     }
 
     fn kernel_name(&self) -> String {
@@ -275,7 +291,7 @@ impl Posterior for LearnedPosterior {
             noise_variance: gp.noise_variance(),
             basis_variance: gp.basis_variance(),
         });
-        crate::gp::tensors::header(&Header { prior, parts })
+        crate::gp::tensors::header(&Header { prior, library_weights: self.weights.clone(), parts })
     }
 
     fn device_form(&self) -> DeviceForm<'_> {

@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
-use super::posterior::{LearnedPosterior, Part};
+use super::posterior::{LearnedPosterior, Part, adapted};
 use crate::base::error::{Error, Result};
+use crate::base::linalg::{factorize, solve_lower};
+use crate::base::simd::dot;
+use crate::brdf::angles::HalfDiff;
 use crate::gp::LeaveOneOut;
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
@@ -12,21 +15,98 @@ use crate::gp::report::FitReport;
 use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
 
+/// Deviation of the brightness by which a material may differ from one of the library that it is like.
+const BRIGHTNESS: f64 = 0.5;
+
+/// The least effective number of materials that shape an adapted prior.
+const FEWEST_MATERIALS: f64 = 20.0;
+
+/// The largest number of samples with which materials are compared.
+const MOST_COMPARED: usize = 512;
+
 /// Finds hyper-parameters of both kinds of colour and conditions their processes. The targets are those of three
 /// channels, whose prior mean is the prior's own.
+///
+/// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those that
+/// the samples resemble.
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
-    let mut found = Vec::new();
-    // The chromatic colours take the space of the achromatic one.
-    let mut space = problem.space;
-    for colour in Colour::ALL {
+    let fit_colour = |prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
-        let own = Problem { space, ..of_colour(problem, prior, colour, &features) };
-        let (conditioned, report) = fit_process(&own)?;
-        space = Some(conditioned.space);
-        found.push((conditioned, report));
+        fit_process(&Problem { space, ..of_colour(problem, prior, colour, &features) })
+    };
+    let (first, first_report) = fit_colour(prior, Colour::Achromatic, problem.space)?;
+    let weights = library_weights(problem, prior, &first)?;
+    let adapted = adapted(prior, &weights)?;
+    let (bright, mut bright_report) = fit_colour(&adapted, Colour::Achromatic, Some(first.space))?;
+    bright_report.evaluations += first_report.evaluations;
+    // The chromatic colours take the space of the achromatic one.
+    let (coloured, coloured_report) = fit_colour(&adapted, Colour::Chromatic, Some(bright.space))?;
+    let posterior = posterior(problem, prior, (weights, adapted), vec![bright, coloured])?;
+    Ok((posterior, combined(&[bright_report, coloured_report])))
+}
+
+/// How much the samples resemble each material of the library, as weights with a sum of 1: the likelihood of the samples
+/// if the material were that one but for its brightness, noise and the rest that the kernel describes, to a power of at
+/// most 1 at which no fewer than 20 materials count.
+fn library_weights(problem: &Problem<'_>, prior: &Prior, found: &Conditioned) -> Result<Vec<f64>> {
+    let some: Vec<usize> = found.order.iter().copied().take(MOST_COMPARED).collect();
+    let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();
+    let features = prior.features(Colour::Achromatic, &angles);
+    let mean = prior.mean(Colour::Achromatic, &angles);
+    let (n, count) = (some.len(), prior.n_functions(Colour::Achromatic));
+    if count == 0 {
+        return Ok(Vec::new());
     }
-    let (conditioned, reports): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    Ok((posterior(problem, prior, conditioned)?, combined(&reports)))
+    let kernel = found.gp.kernel();
+    let x: Vec<[f64; 3]> = angles.iter().map(|&at| found.space.coordinates(at)).collect();
+    let mut factor = vec![0.0; n * n];
+    for j in 0..n {
+        for i in j..n {
+            factor[j * n + i] = kernel.value(&x[i], &x[j]) + BRIGHTNESS * BRIGHTNESS;
+        }
+        factor[j * n + j] += found.gp.noise()[j];
+    }
+    if !factorize(&mut factor, n) {
+        return Ok(Vec::new());
+    }
+    let y = &problem.targets;
+    let log_likelihoods: Vec<f64> = prior
+        .scores()
+        .map(|z| {
+            let rest = |(k, &i): (usize, &usize)| {
+                let target = to_opponent([y[0][i], y[1][i], y[2][i]])[0];
+                target - mean[k] - dot(&features[k * count..(k + 1) * count], z)
+            };
+            let mut white: Vec<f64> = some.iter().enumerate().map(rest).collect();
+            solve_lower(&factor, n, &mut white);
+            -0.5 * dot(&white, &white)
+        })
+        .collect();
+    Ok(tempered(&log_likelihoods))
+}
+
+/// `exp(t l) / sum exp(t l)` with the largest `t` of at most 1 for which the effective number `1 / sum w^2` is large
+/// enough.
+fn tempered(log_likelihoods: &[f64]) -> Vec<f64> {
+    let largest = log_likelihoods.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights = |t: f64| {
+        let mut weights: Vec<f64> = log_likelihoods.iter().map(|l| (t * (l - largest)).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|w| *w /= sum);
+        weights
+    };
+    let effective = |t: f64| weights(t).iter().map(|w| w * w).sum::<f64>().recip();
+    let wanted = FEWEST_MATERIALS.min(0.5 * log_likelihoods.len() as f64);
+    let (mut low, mut high) = (0.0, 1.0);
+    if effective(high) >= wanted {
+        return weights(high);
+    }
+    // The effective number falls with t.
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if effective(middle) >= wanted { low = middle } else { high = middle }
+    }
+    weights(low)
 }
 
 /// Conditions both processes at known hyper-parameters. The second value is the log marginal likelihood there.
@@ -38,14 +118,15 @@ pub(crate) fn condition(
     let Some(chromatic) = &hyper.chromatic else {
         return Err(Error::argument("hyper-parameters", "those of a fit with a learned prior", "others"));
     };
+    let adapted = adapted(prior, &hyper.library_weights)?;
     let (mut found, mut value) = (Vec::new(), 0.0);
     for (colour, hyper) in Colour::ALL.into_iter().zip([hyper, chromatic]) {
-        let features = prior.features(colour, problem.angles);
-        let (conditioned, own) = condition_process(&of_colour(problem, prior, colour, &features), hyper)?;
+        let features = adapted.features(colour, problem.angles);
+        let (conditioned, own) = condition_process(&of_colour(problem, &adapted, colour, &features), hyper)?;
         found.push(conditioned);
         value += own;
     }
-    Ok((posterior(problem, prior, found)?, value))
+    Ok((posterior(problem, prior, (hyper.library_weights.clone(), adapted), found)?, value))
 }
 
 /// The problem of one kind of colour.
@@ -69,6 +150,7 @@ fn of_colour<'a>(problem: &Problem<'a>, prior: &Prior, colour: Colour, features:
 fn posterior(
     problem: &Problem<'_>,
     prior: &Arc<Prior>,
+    adapted: (Vec<f64>, Arc<Prior>),
     conditioned: Vec<Conditioned>,
 ) -> Result<Arc<dyn Posterior>> {
     let parts: Vec<Part> = conditioned
@@ -80,7 +162,7 @@ fn posterior(
         })
         .collect();
     match <[Part; 2]>::try_from(parts) {
-        Ok(parts) => Ok(Arc::new(LearnedPosterior::new(Arc::clone(prior), parts))),
+        Ok(parts) => Ok(Arc::new(LearnedPosterior::new(Arc::clone(prior), adapted, parts))),
         Err(parts) => Err(Error::argument("processes of colours", "2", parts.len())),
     }
 }

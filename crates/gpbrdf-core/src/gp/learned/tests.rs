@@ -49,7 +49,8 @@ fn predictions_are_those_of_the_kernel_with_a_basis() {
         let b_test = DMatrix::from_row_slice(test.len(), count, &prior.features(colour, &test));
         let v = own.basis_variance.unwrap();
         let noise = DMatrix::identity(n, n) * own.noise_variance;
-        let k = DMatrix::from_fn(n, n, |i, j| own.kernel.value(&x[i], &x[j])) + &b * b.transpose() * v + noise;
+        let k =
+            DMatrix::from_fn(n, n, |i, j| own.kernel.value(&x[i], &x[j])) + &b * b.transpose() * v + noise;
         let cross = DMatrix::from_fn(test.len(), n, |i, j| own.kernel.value(&to[i], &x[j]))
             + &b_test * b.transpose() * v;
         let factor = k.cholesky().unwrap();
