@@ -10,15 +10,20 @@ use rayon::prelude::*;
 
 use super::conditional::{JITTER, Process, Scratch};
 use super::neighbours::Neighbours;
+use crate::base::error::Result;
 use crate::base::linalg::{factorize, product_into_slice, solve_lower, view_slice};
 #[cfg(feature = "fit")]
 use crate::base::linalg::{half_log_det, solve};
 use crate::base::simd::{add_scaled, dot};
+use crate::base::watch::Watch;
 use crate::kernel::Kernel;
 
 /// The largest number of inducing points, and the number of samples for each of them.
 const MOST_POINTS: usize = 200;
 const SAMPLES_PER_POINT: usize = 8;
+
+/// Number of samples that are conditioned before somebody may stop the work.
+const STEP: usize = 8;
 
 /// A matrix `B B^T` of low rank: `B = k(X, Z) L^-T` with the inducing points `Z`, which are the first samples, and
 /// the Cholesky factor `L` of `k(Z, Z)`.
@@ -32,7 +37,10 @@ struct LowRank {
 
 impl LowRank {
     /// The part of the first samples of the order; of none where their covariance cannot be factorised.
-    fn new(kernel: &Kernel, x: &[f64], n: usize) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    fn new(kernel: &Kernel, x: &[f64], n: usize, watch: &Watch) -> Result<Self> {
         let mut rank = (n / SAMPLES_PER_POINT).min(MOST_POINTS);
         let dimension = kernel.dimension();
         let at = |i: usize| &x[i * dimension..(i + 1) * dimension];
@@ -49,9 +57,17 @@ impl LowRank {
         }
         let mut found = Self { rank, factor, rows: Vec::new() };
         if rank > 0 {
-            found.rows = (0..n).into_par_iter().flat_map_iter(|i| found.at(kernel, x, at(i))).collect();
+            let (mut rows, steps) = (vec![0.0; n * rank], watch.steps(n / STEP));
+            rows.par_chunks_mut(rank).enumerate().try_for_each(|(i, row)| {
+                if i % STEP == STEP - 1 {
+                    steps.take()?;
+                }
+                row.copy_from_slice(&found.at(kernel, x, at(i)));
+                Ok(())
+            })?;
+            found.rows = rows;
         }
-        found
+        Ok(found)
     }
 
     /// The row of a point.
@@ -138,13 +154,22 @@ pub(super) struct Preconditioner {
 
 impl Preconditioner {
     /// Computes all conditionals. Cost: `O(n m^2 (m + q))` with `m` neighbours and `q` inducing points.
-    pub(super) fn new(process: &Process<'_>, neighbours: Neighbours) -> Self {
-        let low_rank = LowRank::new(process.kernel, process.x, process.noise.len());
-        let (coefficients, variances): (Vec<Vec<f64>>, Vec<f64>) = (0..neighbours.len())
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn new(process: &Process<'_>, neighbours: Neighbours, watch: &Watch) -> Result<Self> {
+        let rows = watch.part(0.0, 0.2);
+        let low_rank = LowRank::new(process.kernel, process.x, process.noise.len(), &rows)?;
+        let conditioning = watch.part(0.2, 1.0);
+        let steps = conditioning.steps(neighbours.len() / STEP);
+        let conditionals: Vec<(Vec<f64>, f64)> = (0..neighbours.len())
             .into_par_iter()
             .map_init(
                 || Scratch::new(neighbours.largest()),
                 |scratch, i| {
+                    if i % STEP == STEP - 1 {
+                        steps.take()?;
+                    }
                     let given = neighbours.of(i);
                     let at = |a: usize| given[a] as usize;
                     let (b, explained) = scratch.explain(
@@ -154,10 +179,11 @@ impl Preconditioner {
                         |a| low_rank.rest(process, i, at(a)),
                     );
                     let variance = low_rank.rest_variance(process, i) - explained;
-                    (b.to_vec(), variance.max(process.least_variance(i)))
+                    Ok((b.to_vec(), variance.max(process.least_variance(i))))
                 },
             )
-            .unzip();
+            .collect::<Result<_>>()?;
+        let (coefficients, variances): (Vec<Vec<f64>>, Vec<f64>) = conditionals.into_iter().unzip();
         let rank = low_rank.rank;
         let mut whitened = vec![0.0; low_rank.rows.len()];
         let mut capacitance = vec![0.0; rank * rank];
@@ -176,7 +202,7 @@ impl Preconditioner {
             // The identity makes it positive definite.
             factorize(&mut capacitance, rank);
         }
-        Self { neighbours, low_rank, coefficients, variances, whitened, capacitance }
+        Ok(Self { neighbours, low_rank, coefficients, variances, whitened, capacitance })
     }
 
     /// What variances need of this.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::cost::search_share;
 use super::fit::{Data, Search, State};
 use super::posterior::ScatteredPosterior;
 use crate::base::error::{Error, Result};
@@ -9,6 +10,9 @@ use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{Fitted, Problem};
 use crate::sample::space::InputSpace;
+
+/// The number of samples with which leaving one out takes as long as all products.
+const LEFT_OUT: f64 = 3e3;
 
 /// Finds hyper-parameters in each of the spaces to choose from, follows those of the largest likelihood while
 /// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance,
@@ -31,8 +35,10 @@ pub(crate) fn fit(problem: &Problem<'_>) -> Result<Fitted> {
     evaluations -= best.evaluations;
     let space = best.space;
     let (data, state, mut report) = best.finish()?;
-    state.report_samples(&data, &mut report);
-    let (gp, value) = state.condition(problem, &data)?;
+    let (searched, n) = (search_share(problem.angles.len()), problem.angles.len() as f64);
+    let left_out = searched + (1.0 - searched) * LEFT_OUT / (LEFT_OUT + n);
+    state.report_samples(&data, &problem.watch.part(searched, left_out), &mut report)?;
+    let (gp, value) = state.condition(&problem.watch.part(left_out, 1.0), &data)?;
     report.log_marginal_likelihood = value;
     report.evaluations += evaluations;
     Ok((Arc::new(ScatteredPosterior { gp, space }), report))
@@ -43,7 +49,7 @@ pub(crate) fn condition(problem: &Problem<'_>, hyper: &Hyper) -> Result<(Arc<dyn
     let space = problem.space.or(hyper.space).unwrap_or(InputSpace::ISOTROPIC[0]);
     let data = data(problem, space)?;
     let state = State::known(hyper.kernel.clone(), hyper.noise_variance, &data);
-    let (gp, value) = state.condition(problem, &data)?;
+    let (gp, value) = state.condition(problem.watch, &data)?;
     Ok((Arc::new(ScatteredPosterior { gp, space }), value))
 }
 
