@@ -38,7 +38,7 @@
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
 //! All features are on by default. Without them a program that loads, evaluates and bakes models builds a tree of
-//! 54 crates; each feature adds what its name says:
+//! 49 crates; each feature adds what its name says:
 //!
 //! - `fit` makes models: [`fit`], [`condition`], [`compress`] and what they are made of. It brings argmin and faer.
 //!   faer then computes predictions, too: their rounding differs from nalgebra's, and the first variance of a large
@@ -68,12 +68,12 @@ mod test_data;
 /// Directions are vectors of this crate.
 pub use nalgebra;
 
-pub use base::{Error, Result};
+pub use base::{Error, Observer, Progress, Result};
 pub use brdf::{Brdf, BrdfTable, HalfDiff, Rgb, SigmaTable};
 #[cfg(feature = "formats")]
 pub use formats::{Content, Source};
 #[cfg(feature = "fit")]
-pub use gp::{FitReport, Noise, Observer, Outliers};
+pub use gp::{FitReport, Noise, Outliers};
 pub use gp::{Hyper, Solver};
 pub use judge::{Environment, Metrics};
 pub use kernel::Shape;

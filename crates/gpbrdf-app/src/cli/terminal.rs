@@ -1,15 +1,18 @@
 //! What goes to standard output and standard error. Nothing else in the command line prints.
 
 use std::io::{self, IsTerminal, Write};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use gpbrdf_core::Progress;
 use gpbrdf_core::base::number::significant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::job::{Found, Observer, Progress, Report, Stage};
+use crate::job::{Found, Observer, Report, Stage, remaining};
 
-/// Standard output and standard error, as the user wants them, with a spinner for what takes long.
+/// Standard output and standard error, as the user wants them, with a spinner for what takes long and a bar where it
+/// is known how much of it is done.
 #[derive(Clone, Debug)]
 pub(crate) struct Terminal {
     quiet: bool,
@@ -17,19 +20,40 @@ pub(crate) struct Terminal {
     /// Drawn on standard error if that is a terminal. It stays while one stage follows another and steps
     /// aside for each line that is printed, so that short stages make no flicker.
     spinner: ProgressBar,
+    shown: Arc<Mutex<Shown>>,
+}
+
+/// What stands beside the spinner.
+#[derive(Debug, Default)]
+struct Shown {
+    stage: &'static str,
+    evaluations: usize,
+    /// Length of the bar, 0 to [`BAR`]; `None` where there is no bar.
+    done: Option<u64>,
 }
 
 /// How often the spinner turns.
 const TICK: Duration = Duration::from_millis(100);
 
+/// The largest position of a bar.
+const BAR: u64 = 200;
+
+const SPINNER_STYLE: &str = "{spinner} {msg} {elapsed}";
+const BAR_STYLE: &str = "{spinner} {msg} [{bar:30}] {percent} % {elapsed}{prefix}";
+
 impl Terminal {
     pub(crate) fn new(quiet: bool, verbose: u8) -> Self {
         let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let spinner = ProgressBar::with_draw_target(None, target);
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-            spinner.set_style(style);
+        let spinner = ProgressBar::with_draw_target(Some(BAR), target);
+        let terminal = Self { quiet, verbose, spinner, shown: Arc::default() };
+        terminal.set_style(SPINNER_STYLE);
+        terminal
+    }
+
+    fn set_style(&self, template: &str) {
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.spinner.set_style(style.progress_chars("=> "));
         }
-        Self { quiet, verbose, spinner }
     }
 
     /// Writes to standard output what the user asked for.
@@ -83,6 +107,13 @@ impl Terminal {
         if self.spinner.is_hidden() {
             return;
         }
+        let before = std::mem::replace(
+            &mut *self.shown.lock().unwrap_or_else(PoisonError::into_inner),
+            Shown { stage: message, ..Shown::default() },
+        );
+        if before.done.is_some() {
+            self.set_style(SPINNER_STYLE);
+        }
         self.spinner.set_message(message);
         self.spinner.reset_elapsed();
         self.spinner.enable_steady_tick(TICK);
@@ -107,10 +138,28 @@ impl Observer for Terminal {
         if self.spinner.is_hidden() {
             return;
         }
-        self.spinner.set_message(match progress {
-            Progress::Evaluations(count) => format!("{} ({count} evaluations)", Stage::Fit.label()),
-            Progress::Share(share) => format!("{} ({:.0} %)", Stage::BakeOnDevice.label(), 100.0 * share),
-        });
+        // Another thread that is at it shows nearly the same.
+        let Ok(mut shown) = self.shown.try_lock() else { return };
+        if progress.evaluations != shown.evaluations {
+            shown.evaluations = progress.evaluations;
+            self.spinner.set_message(format!("{} ({} evaluations)", shown.stage, progress.evaluations));
+        }
+        let Some(share) = progress.share else { return };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a share lies within 0 and 1"
+        )]
+        let done = (share * BAR as f64) as u64;
+        if shown.done != Some(done) {
+            if shown.done.is_none() {
+                self.set_style(BAR_STYLE);
+            }
+            shown.done = Some(done);
+            self.spinner.set_position(done);
+            let left = remaining(self.spinner.elapsed(), share);
+            self.spinner.set_prefix(left.map(|left| format!(", {left}")).unwrap_or_default());
+        }
     }
 
     fn found(&self, found: Found<'_>) {

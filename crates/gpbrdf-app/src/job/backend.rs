@@ -6,10 +6,11 @@ use std::sync::Arc;
 use anyhow::Result;
 use clap::ValueEnum;
 use gpbrdf_core::gp::DeviceForm;
-use gpbrdf_core::{BrdfTable, Model, SigmaTable, bake_mean};
+use gpbrdf_core::model::bake_mean_observed;
+use gpbrdf_core::{BrdfTable, Model, Progress, SigmaTable};
 use gpbrdf_render::{AdapterChoice, Baker, Context, Error, Precision};
 
-use super::run::{Baked, Observer, Progress, Run};
+use super::run::{Baked, Observer, Run};
 use super::stage::Stage;
 
 /// What [`Baked::backend`] names the processor.
@@ -50,7 +51,8 @@ impl Backend {
                 return Ok(Baked { mean: Arc::new(mean), sigma, backend: context.describe() });
             }
         }
-        let mean = run.stage(Stage::BakeMean, || Ok(bake_mean(model)))?;
+        let watch = run.watch();
+        let mean = run.stage(Stage::BakeMean, || Ok(bake_mean_observed(model, &watch)?))?;
         Ok(Baked { mean: Arc::new(mean), sigma: None, backend: CPU.to_owned() })
     }
 
@@ -84,7 +86,7 @@ fn bake_on_device(
     observer: &dyn Observer,
 ) -> Result<(BrdfTable, Option<SigmaTable>), Error> {
     let mut progress = |share| {
-        observer.progress(Progress::Share(share));
+        observer.progress(Progress::of_share(share));
         if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let texture = Baker::new(context)?.bake(model, Precision::Single, &mut progress)?;

@@ -1,4 +1,6 @@
-//! What a fit will take, said before it starts.
+//! What a fit will take, said before it starts and while it goes on.
+
+use std::time::Duration;
 
 use anyhow::Result;
 use gpbrdf_core::Solver;
@@ -37,6 +39,18 @@ pub(crate) fn forecast(samples: usize, solver: Solver, per_channel: bool) -> Res
         .then(|| format!("a dense fit to {samples} samples takes {gib:.1} GiB and about {seconds:.0} s")))
 }
 
+/// What is said of the time that is left of work of which a share was done in `elapsed`: nothing in its first second
+/// and before a twentieth of it is done.
+pub(crate) fn remaining(elapsed: Duration, share: f64) -> Option<String> {
+    let seconds = elapsed.as_secs_f64();
+    let left = seconds * (1.0 - share) / share;
+    match left {
+        _ if seconds < 1.0 || share < 0.05 => None,
+        left if left < 100.0 => Some(format!("about {left:.0} s left")),
+        left => Some(format!("about {:.0} min left", left / 60.0)),
+    }
+}
+
 /// The largest number of samples, of at most `limit`, whose dense fit with `terms` kernels is expected to
 /// take no more than `seconds`.
 pub(crate) fn samples_within(seconds: f64, terms: usize, limit: usize) -> usize {
@@ -50,4 +64,19 @@ pub(crate) fn samples_within(seconds: f64, terms: usize, limit: usize) -> usize 
         if fits(middle) { low = middle } else { high = middle }
     }
     low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_said_once_it_is_known() {
+        let at = |seconds: f64, share| remaining(Duration::from_secs_f64(seconds), share);
+        assert_eq!(at(0.5, 0.5), None);
+        assert_eq!(at(10.0, 0.01), None);
+        assert_eq!(at(10.0, 0.25).unwrap(), "about 30 s left");
+        assert_eq!(at(100.0, 0.1).unwrap(), "about 15 min left");
+        assert_eq!(at(3.0, 1.0).unwrap(), "about 0 s left");
+    }
 }

@@ -30,16 +30,15 @@ mod stage;
 
 pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
-pub(crate) use forecast::samples_within;
+pub(crate) use forecast::{remaining, samples_within};
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
-pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]
 pub(crate) use run::is_cancelled;
-pub(crate) use run::{Baked, Baking, Found, Job, Judging, Observer, Outcome, Progress, Run, Truth};
+pub(crate) use run::{Baked, Baking, Found, Job, Judging, Observer, Outcome, Run, Truth};
 pub(crate) use sample::Measured;
 pub(crate) use spec::{ModelSpec, PAPER_SAMPLES};
 pub(crate) use stage::Stage;

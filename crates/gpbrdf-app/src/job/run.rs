@@ -7,9 +7,10 @@ use std::time::Instant;
 use anyhow::Result;
 use gpbrdf_core::judge::{CellMetrics, Interval, LeftOut};
 use gpbrdf_core::model::Conditioned;
+use gpbrdf_core::model::bake_sigma_observed;
 use gpbrdf_core::{
     BrdfTable, CompressOptions, Content, Environment, Error, Fit, FitOptions, FitReport, Metrics, Model,
-    SigmaTable, Source, bake_sigma, compress, condition, fit,
+    Progress, SigmaTable, Source, compress, condition, fit,
 };
 
 use super::backend::Backend;
@@ -18,11 +19,11 @@ use super::sample::{Measured, symmetry};
 use super::spec::ModelSpec;
 use super::stage::{Seconds, Stage};
 
-/// Follows a run, from the thread that does the work.
+/// Follows a run, from the threads that do the work.
 pub(crate) trait Observer: Send + Sync {
     /// A stage begins.
     fn begin(&self, _stage: Stage) {}
-    /// How far the stage has come.
+    /// How far the stage has come; called many times a second, by any thread.
     fn progress(&self, _progress: Progress) {}
     /// A result is there, before the run goes on.
     fn found(&self, _found: Found<'_>) {}
@@ -36,15 +37,6 @@ pub(crate) trait Observer: Send + Sync {
     fn note(&self, _text: &str) {}
     /// Something that is not as it was asked for.
     fn warn(&self, _text: &str) {}
-}
-
-/// How far a stage has come.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Progress {
-    /// Evaluations of the likelihood so far.
-    Evaluations(usize),
-    /// The share that is done, 0 to 1.
-    Share(f64),
 }
 
 /// A result of a run.
@@ -184,6 +176,15 @@ impl Run {
         Arc::clone(&self.observer)
     }
 
+    /// The observer of long work, which tells that of the run and hears from it whether to give up.
+    pub(super) fn watch(&self) -> gpbrdf_core::Observer {
+        let observer = self.observer();
+        gpbrdf_core::Observer::new(move |progress| {
+            observer.progress(progress);
+            if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })
+    }
+
     /// Does `work` as a stage.
     ///
     /// # Errors
@@ -242,7 +243,7 @@ impl Run {
         })?;
         observer.found(Found::Samples(&measured));
         let samples = Arc::clone(&measured.samples);
-        let options = spec.fit_options(measured.symmetry)?;
+        let options = FitOptions { observer: self.watch(), ..spec.fit_options(measured.symmetry)? };
         self.stage(Stage::Fit, || {
             // Hyper-parameters of one solver mean nothing to another.
             let solver = options.solver.resolve(samples.lattice().is_some());
@@ -252,12 +253,7 @@ impl Run {
                 let fitted = Fitted::from_file(Arc::new(model));
                 return Ok(Fitted { measured: Some(measured), log_marginal_likelihood, ..fitted });
             }
-            let observer = gpbrdf_core::Observer::new(move |evaluations| {
-                observer.progress(Progress::Evaluations(evaluations));
-                if observer.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            });
-            let fit = fit(&samples, &FitOptions { observer, ..options })?;
-            Fitted::searched(fit, Some(measured))
+            Fitted::searched(fit(&samples, &options)?, Some(measured))
         })
     }
 
@@ -275,7 +271,9 @@ impl Run {
         let mut baked = baking.backend.bake_mean(self, &fitted.model)?;
         self.observer.found(Found::Mean { fitted, mean: &baked.mean, seconds: &self.seconds });
         if baking.sigma && baked.sigma.is_none() {
-            baked.sigma = Some(Arc::new(self.stage(Stage::BakeSigma, || Ok(bake_sigma(&fitted.model)?))?));
+            let watch = self.watch();
+            let sigma = self.stage(Stage::BakeSigma, || Ok(bake_sigma_observed(&fitted.model, &watch)?))?;
+            baked.sigma = Some(Arc::new(sigma));
         }
         baked.sigma = baked.sigma.filter(|_| baking.sigma);
         if let Some(sigma) = &baked.sigma {

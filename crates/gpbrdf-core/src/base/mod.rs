@@ -1,5 +1,5 @@
 //! Utilities without a subject of their own: errors, files written whole, grids of pixels, random numbers,
-//! vector instructions, half precision, linear algebra, numbers for people.
+//! vector instructions, half precision, linear algebra, numbers for people, observers of long work.
 
 pub(crate) mod atomic_file;
 pub(crate) mod error;
@@ -9,8 +9,10 @@ pub mod number;
 pub(crate) mod random;
 pub(crate) mod raster;
 pub(crate) mod simd;
+pub(crate) mod watch;
 
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
 pub use error::{Error, Result};
 pub use random::{SplitMix64, golden_ratio_subset};
 pub use raster::Raster;
+pub use watch::{Observer, Progress, Steps, Watch};

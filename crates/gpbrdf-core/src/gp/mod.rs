@@ -45,7 +45,7 @@ pub use lattice::{LatticeLikelihood, fit::fit_lattice};
 #[cfg(feature = "fit")]
 pub use optimize::{LogNormal, OptimizeOptions, Optimum, Parameter, maximize};
 #[cfg(feature = "fit")]
-pub use problem::{Observer, Outliers};
+pub use problem::Outliers;
 #[cfg(feature = "fit")]
 pub use report::{FitReport, Noise};
 #[cfg(feature = "fit")]

@@ -5,6 +5,7 @@ use std::fmt::Debug;
 use serde_json::Value;
 
 use crate::base::error::Result;
+use crate::base::watch::Watch;
 use crate::brdf::angles::HalfDiff;
 use crate::gp::hyper::Hyper;
 use crate::gp::lattice::LatticeGp;
@@ -80,8 +81,11 @@ pub trait Posterior: Debug + Send + Sync {
 
     /// Evaluates the mean in every cell of a table. The default implementation predicts the mean of every
     /// distinct cell, one slab of directions at a time.
-    fn bake_mean(&self, table: &mut MeanTable<'_>) {
-        table::points::bake_mean(self, table);
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    fn bake_mean(&self, table: &mut MeanTable<'_>, watch: &Watch) -> Result<()> {
+        table::points::bake_mean(self, table, watch)
     }
 
     /// The latent standard deviation in every cell of a table, as one plane in MERL order for each of the
@@ -89,9 +93,10 @@ pub trait Posterior: Debug + Send + Sync {
     /// and interpolates between them.
     ///
     /// # Errors
-    /// Those of [`Posterior::predict_variance`].
-    fn bake_sigma(&self) -> Result<Vec<Vec<f32>>> {
-        table::points::bake_sigma(self)
+    /// Those of [`Posterior::predict_variance`], and [`Error::Cancelled`](crate::Error::Cancelled) where the
+    /// observer stops the work.
+    fn bake_sigma(&self, watch: &Watch) -> Result<Vec<Vec<f32>>> {
+        table::points::bake_sigma(self, watch)
     }
 }
 

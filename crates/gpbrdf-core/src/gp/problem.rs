@@ -1,13 +1,11 @@
-//! The input of a fit, and the observer that can stop it.
+//! The input of a fit.
 
-use std::cell::Cell;
-use std::fmt;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::{Error, Result};
+use crate::base::watch::Watch;
 use crate::brdf::angles::HalfDiff;
 use crate::gp::optimize::OptimizeOptions;
 use crate::gp::posterior::Posterior;
@@ -50,8 +48,9 @@ pub(crate) struct Problem<'a> {
     pub(crate) outliers: Outliers,
     /// Settings of the search.
     pub(crate) optimize: &'a OptimizeOptions,
-    /// Counts the evaluations of the likelihood and calls the observer before each of them.
-    pub(crate) watch: &'a Watch<'a>,
+    /// Counts the evaluations of the likelihood and calls the observer before each of them, and during other long
+    /// work.
+    pub(crate) watch: &'a Watch,
 }
 
 /// Basis functions with independent coefficients of the same variance, about 1.
@@ -89,46 +88,4 @@ pub enum Outliers {
     /// Their noise variance is larger, according to Student's t distribution, so that they hardly count.
     #[default]
     Downweight,
-}
-
-/// A callback that runs before each evaluation of a likelihood. It receives the number of evaluations so far,
-/// including the one that is about to run, and decides whether the search continues. The default observer
-/// lets every search run to its end.
-#[derive(Clone, Default)]
-pub struct Observer(Option<Arc<dyn Fn(usize) -> ControlFlow<()> + Send + Sync>>);
-
-impl Observer {
-    /// An observer that calls `observe`. A search in which it returns [`ControlFlow::Break`] ends with
-    /// [`Error::Cancelled`].
-    pub fn new(observe: impl Fn(usize) -> ControlFlow<()> + Send + Sync + 'static) -> Self {
-        Self(Some(Arc::new(observe)))
-    }
-}
-
-impl fmt::Debug for Observer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if self.0.is_some() { "Observer" } else { "no observer" })
-    }
-}
-
-/// Counts the evaluations of one fit for its observer.
-pub(crate) struct Watch<'a> {
-    observer: &'a Observer,
-    evaluations: Cell<usize>,
-}
-
-impl<'a> Watch<'a> {
-    pub(crate) fn new(observer: &'a Observer) -> Self {
-        Self { observer, evaluations: Cell::new(0) }
-    }
-
-    /// Counts one evaluation and calls the observer; every evaluation must be preceded by this call. The
-    /// error is [`Error::Cancelled`] where the observer stops the search.
-    pub(crate) fn evaluation(&self) -> Result<()> {
-        self.evaluations.set(self.evaluations.get() + 1);
-        match &self.observer.0 {
-            Some(observe) if observe(self.evaluations.get()).is_break() => Err(Error::Cancelled),
-            _ => Ok(()),
-        }
-    }
 }

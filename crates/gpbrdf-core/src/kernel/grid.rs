@@ -79,7 +79,10 @@ fn fill_term(term: &Term1d, points: &[f64], nodes: &[f64], scratch: &mut GridScr
     exponentials(nodes, 1.0, &mut scratch.node_rising);
     exponentials(nodes, -1.0, &mut scratch.node_falling);
     let polynomial = coefficients.map(|c| term.weight * c);
-    vectorized(|| separated(points, nodes, scratch, scale, polynomial, out));
+    vectorized(
+        #[inline(always)]
+        || separated(points, nodes, scratch, scale, polynomial, out),
+    );
 }
 
 #[inline(always)]

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::axis::Kernel1d;
 use super::composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
-use crate::base::simd::{add_scaled, dot, multiply, scale_in_place, scale_into, vectorized};
+use super::shape::Shape;
+use crate::base::simd::{add_scaled, dot, dots, multiply, scale_into, vectorized};
 
 /// Number of points of a strip.
 pub(super) const STRIP: usize = 512;
@@ -48,11 +49,11 @@ impl Points {
         self.len
     }
 
-    /// `sum_k (x_k - y_k)^2 / l_k^2` from the points of `range` to point `j` of `other`, where there are three
+    /// Writes the values of one ARD term between the points of `range` and point `j` of `other`, where there are three
     /// coordinates and all are linear; otherwise returns false.
-    fn scaled_distances(
+    fn linear_term(
         &self,
-        length_scale: &[f64],
+        (variance, shape, length_scale): (f64, Shape, &[f64]),
         range: Range<usize>,
         other: &Self,
         j: usize,
@@ -64,16 +65,9 @@ impl Points {
         else {
             return false;
         };
-        let ([y0, y1, y2], [w0, w1, w2]) =
-            ([y0[j], y1[j], y2[j]], [0, 1, 2].map(|k: usize| (length_scale[k] * length_scale[k]).recip()));
-        let (x0, x1, x2) = (&x0[range.clone()], &x1[range.clone()], &x2[range]);
-        vectorized(|| {
-            for (((o, x0), x1), x2) in out.iter_mut().zip(x0).zip(x1).zip(x2) {
-                *o = w0 * ((x0 - y0) * (x0 - y0))
-                    + w1 * ((x1 - y1) * (x1 - y1))
-                    + w2 * ((x2 - y2) * (x2 - y2));
-            }
-        });
+        let from = [&x0[range.clone()], &x1[range.clone()], &x2[range]];
+        let scales = [0, 1, 2].map(|k: usize| (length_scale[k] * length_scale[k]).recip());
+        shape.fill_between(variance, from, [y0[j], y1[j], y2[j]], scales, out);
         true
     }
 
@@ -89,21 +83,27 @@ impl Points {
         match (&self.axes[k], &other.axes[k]) {
             (AxisPoints::Linear(x), AxisPoints::Linear(y)) => {
                 let (x, y) = (&x[range], y[j]);
-                vectorized(|| {
-                    for (o, x) in out.iter_mut().zip(x) {
-                        *o = (x - y) * (x - y);
-                    }
-                });
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for (o, x) in out.iter_mut().zip(x) {
+                            *o = (x - y) * (x - y);
+                        }
+                    },
+                );
             }
             // sin(x - y) = sin x cos y - cos x sin y.
             (AxisPoints::Chord { sin, cos }, AxisPoints::Chord { sin: sin_y, cos: cos_y }) => {
                 let (sin, cos, sin_y, cos_y) = (&sin[range.clone()], &cos[range], sin_y[j], cos_y[j]);
-                vectorized(|| {
-                    for ((o, s), c) in out.iter_mut().zip(sin).zip(cos) {
-                        let d = s * cos_y - c * sin_y;
-                        *o = d * d;
-                    }
-                });
+                vectorized(
+                    #[inline(always)]
+                    || {
+                        for ((o, s), c) in out.iter_mut().zip(sin).zip(cos) {
+                            let d = s * cos_y - c * sin_y;
+                            *o = d * d;
+                        }
+                    },
+                );
             }
             _ => unreachable!("both sets of points are made with one kernel's metric"),
         }
@@ -129,7 +129,7 @@ impl RowScratch {
 }
 
 /// Number of points whose kernel sums one parallel task computes.
-const SUM_BLOCK: usize = 128;
+const SUM_BLOCK: usize = 64;
 
 impl Kernel {
     /// `sum_i weights_ic k(x_j, points_i)` at every point `x_j` of `at`: rows with one value per channel.
@@ -139,12 +139,22 @@ impl Kernel {
         let channels = weights.len() / n;
         let mut out = vec![0.0; at.len() * channels];
         out.par_chunks_mut(SUM_BLOCK * channels).enumerate().for_each_init(
-            || (RowScratch::new(self.dimension()), vec![0.0; n]),
-            |(scratch, row), (block, out)| {
-                for (out, j) in out.chunks_mut(channels).zip(block * SUM_BLOCK..) {
-                    self.row(points, 0..n, at, j, scratch, row);
-                    for (out, weights) in out.iter_mut().zip(weights.chunks(n)) {
-                        *out = dot(row, weights);
+            || RowScratch::new(self.dimension()),
+            |scratch, (block, out)| {
+                let mut row = [0.0; STRIP];
+                // One strip of points after the other, so that it is in the first cache for the whole block.
+                for start in (0..n).step_by(STRIP) {
+                    let strip = start..n.min(start + STRIP);
+                    let row = &mut row[..strip.len()];
+                    for (out, j) in out.chunks_mut(channels).zip(block * SUM_BLOCK..) {
+                        self.row(points, strip.clone(), at, j, scratch, row);
+                        let column = |c: usize| &weights[c * n..(c + 1) * n][strip.clone()];
+                        if let [a, b, c] = out {
+                            let sums = dots(row, [column(0), column(1), column(2)]);
+                            (*a, *b, *c) = (*a + sums[0], *b + sums[1], *c + sums[2]);
+                        } else {
+                            out.iter_mut().enumerate().for_each(|(c, out)| *out += dot(row, column(c)));
+                        }
                     }
                 }
             },
@@ -167,10 +177,8 @@ impl Kernel {
             let n = out.len();
             // One ARD term of three linear coordinates is what scattered samples have: everything in one pass.
             if let [KernelTerm { variance, body: KernelBody::Ard { shape, length_scale } }] = &self.terms[..]
-                && points.scaled_distances(length_scale, start..start + n, other, j, out)
+                && points.linear_term((*variance, *shape, length_scale), start..start + n, other, j, out)
             {
-                shape.fill(out);
-                scale_in_place(*variance, out);
                 continue;
             }
             for (k, d2) in scratch.d2.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 //! Baking: the evaluation of a model into tables of its mean and its sigma.
 
 use crate::base::error::{Error, Result};
+use crate::base::watch::{Observer, Watch};
 use crate::brdf::Rgb;
 use crate::brdf::sigma::SigmaTable;
 use crate::brdf::table::{BrdfTable, N_CELLS};
@@ -16,11 +17,30 @@ use crate::sample::Transform;
 #[must_use]
 pub fn bake_mean(model: &Model) -> BrdfTable {
     let mut cells = vec![[0.0f32; 3]; N_CELLS];
-    for (first_channel, posterior) in model.posteriors() {
-        let (offsets, transform) = (model.offsets, model.transform);
-        posterior.bake_mean(&mut MeanTable { cells: &mut cells, first_channel, offsets, transform });
-    }
+    // Nothing but an observer ends this early.
+    let _ = fill_mean(model, &Watch::default(), &mut cells);
     BrdfTable::from_cells(cells)
+}
+
+/// The same with an observer, which hears of the share that is done and can stop the work. Models on lattices take
+/// tens of milliseconds, which it does not interrupt.
+///
+/// # Errors
+/// [`Error::Cancelled`] where the observer stops the work.
+pub fn bake_mean_observed(model: &Model, observer: &Observer) -> Result<BrdfTable> {
+    let mut cells = vec![[0.0f32; 3]; N_CELLS];
+    fill_mean(model, &Watch::new(observer), &mut cells)?;
+    Ok(BrdfTable::from_cells(cells))
+}
+
+fn fill_mean(model: &Model, watch: &Watch, cells: &mut [[f32; 3]]) -> Result<()> {
+    let count = model.posteriors().count() as f64;
+    for (k, (first_channel, posterior)) in model.posteriors().enumerate() {
+        let (offsets, transform) = (model.offsets, model.transform);
+        let watch = watch.part(k as f64 / count, (k + 1) as f64 / count);
+        posterior.bake_mean(&mut MeanTable { cells, first_channel, offsets, transform }, &watch)?;
+    }
+    Ok(())
 }
 
 /// Evaluates the latent standard deviation of a model's target at the centre of every cell, in parallel.
@@ -31,9 +51,19 @@ pub fn bake_mean(model: &Model) -> BrdfTable {
 /// # Errors
 /// A covariance that cannot be factorised or does not fit in memory.
 pub fn bake_sigma(model: &Model) -> Result<SigmaTable> {
-    let mut planes = Vec::new();
-    for (_, posterior) in model.posteriors() {
-        planes.extend(posterior.bake_sigma()?);
+    bake_sigma_observed(model, &Observer::default())
+}
+
+/// The same with an observer, which hears of the share that is done and can stop the work. What is factorised
+/// before the first variance is not interrupted.
+///
+/// # Errors
+/// Those of [`bake_sigma`], and [`Error::Cancelled`] where the observer stops the work.
+pub fn bake_sigma_observed(model: &Model, observer: &Observer) -> Result<SigmaTable> {
+    let (watch, mut planes) = (Watch::new(observer), Vec::new());
+    let count = model.posteriors().count() as f64;
+    for (k, (_, posterior)) in model.posteriors().enumerate() {
+        planes.extend(posterior.bake_sigma(&watch.part(k as f64 / count, (k + 1) as f64 / count))?);
     }
     if planes.len() == 2 {
         return Err(Error::argument("variances of a model", "1 for all channels, or 3", planes.len()));

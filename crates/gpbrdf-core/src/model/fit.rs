@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use crate::base::error::{Error, Result};
+use crate::base::watch::{Observer, Watch};
 use crate::brdf::Rgb;
-use crate::gp::problem::{Problem, Watch};
-use crate::gp::{FitReport, Hyper, Noise, Observer, OptimizeOptions, Outliers, Solver};
+use crate::gp::problem::Problem;
+use crate::gp::{FitReport, Hyper, Noise, OptimizeOptions, Outliers, Solver};
 use crate::kernel::Shape;
 use crate::model::Model;
 use crate::prior::Prior;
@@ -57,7 +58,7 @@ pub struct FitOptions {
     pub space: Option<InputSpace>,
     /// Settings of the search for hyper-parameters.
     pub optimize: OptimizeOptions,
-    /// Called before each evaluation of the likelihood; it can cancel the fit.
+    /// Called before each evaluation of the likelihood and during other long work; it can cancel the fit.
     pub observer: Observer,
 }
 
@@ -128,7 +129,7 @@ impl FitOptions {
         targets: Vec<Vec<f64>>,
         known_noise: &'a [f64],
         prior: Option<Arc<Prior>>,
-        watch: &'a Watch<'a>,
+        watch: &'a Watch,
     ) -> Problem<'a> {
         Problem {
             angles: &samples.angles,
@@ -183,7 +184,9 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     options.kernel.iter().flatten().try_for_each(|shape| shape.validate())?;
     let groups: &[&[usize]] = if options.per_channel { &[&[0], &[1], &[2]] } else { &[&[0, 1, 2]] };
     let watch = Watch::new(&options.observer);
-    let fitted = groups.iter().map(|channels| {
+    let share = |group: usize| group as f64 / groups.len() as f64;
+    let fitted = groups.iter().enumerate().map(|(group, channels)| {
+        let watch = watch.part(share(group), share(group + 1));
         let noise = known_noise(samples, options.transform, channels);
         let targets = channels.iter().map(|&c| targets[c].clone()).collect();
         options.solver.fit(&options.problem(samples, targets, &noise, prior.clone(), &watch))
@@ -266,11 +269,11 @@ mod tests {
     use super::*;
     use crate::formats::source::Source;
     use crate::kernel::KernelBody;
-    use crate::model::IntervalOf;
+    use crate::model::{IntervalOf, bake_mean_observed, bake_sigma_observed};
     use crate::sample::{LatticeLayout, Layout, Provenance};
     use std::ops::ControlFlow;
-    use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::{Arc, Mutex};
 
     fn samples() -> SampleSet {
         let source = Source::built_in("ward").unwrap();
@@ -309,9 +312,9 @@ mod tests {
         for solver in [Solver::Lattice, Solver::Dense] {
             let asked = Arc::new(AtomicUsize::new(0));
             let counter = Arc::clone(&asked);
-            let observer = Observer::new(move |evaluations| {
-                assert_eq!(counter.fetch_add(1, Ordering::Relaxed) + 1, evaluations);
-                if evaluations == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let observer = Observer::new(move |progress| {
+                assert_eq!(counter.fetch_add(1, Ordering::Relaxed) + 1, progress.evaluations);
+                if progress.evaluations == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             });
             let stopped = fit(&samples, &FitOptions { solver, observer, ..options.clone() });
             assert!(matches!(stopped, Err(Error::Cancelled)), "{solver:?}");
@@ -319,5 +322,41 @@ mod tests {
         }
         let scattered = SampleSet { origin: Provenance::default(), ..samples };
         assert!(condition(&scattered, &options, &hyper).is_err());
+    }
+
+    #[test]
+    fn long_work_on_scattered_samples_tells_how_far_it_is_and_stops_anywhere() {
+        let source = Source::built_in("ward").unwrap();
+        let samples = source.measure(&Layout::Random { count: 300, seed: 1 }).unwrap();
+        // An observer that stops at a share, and the shares that it was told.
+        let stopping = |at: f64| {
+            let shares = Arc::new(Mutex::new(Vec::new()));
+            let told = Arc::clone(&shares);
+            let observer = Observer::new(move |progress| {
+                let share = progress.share.unwrap();
+                told.lock().unwrap().push(share);
+                if share < at { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            });
+            (observer, shares)
+        };
+        let (observer, shares) = stopping(2.0);
+        let fitted = fit(&samples, &FitOptions { observer, ..FitOptions::default() }).unwrap();
+        let shares = shares.lock().unwrap();
+        assert!(shares.len() > 100 && shares.is_sorted() && shares[shares.len() - 1] > 0.9, "{shares:?}");
+        let plain = fit(&samples, &FitOptions::default()).unwrap();
+        let predicted = |fitted: &Fit| fitted.model.predict_mean(&samples.angles[..50]);
+        assert_eq!(predicted(&fitted), predicted(&plain));
+        for k in [1, 5, 9] {
+            let at = shares[k * shares.len() / 10];
+            let (observer, told) = stopping(at);
+            let stopped = fit(&samples, &FitOptions { observer, ..FitOptions::default() });
+            assert!(matches!(stopped, Err(Error::Cancelled)), "{at}");
+            // Every thread hears of it at most once.
+            let late = told.lock().unwrap().iter().filter(|&&share| share >= at).count();
+            assert!(late <= rayon::current_num_threads(), "{at}: {late}");
+        }
+        let (observer, _) = stopping(0.3);
+        assert!(matches!(bake_mean_observed(&plain.model, &observer), Err(Error::Cancelled)));
+        assert!(matches!(bake_sigma_observed(&plain.model, &observer), Err(Error::Cancelled)));
     }
 }

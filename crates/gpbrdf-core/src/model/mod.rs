@@ -8,7 +8,7 @@ pub(crate) mod file;
 pub(crate) mod fit;
 mod interval;
 
-pub use bake::{Baked, bake_mean, bake_sigma};
+pub use bake::{Baked, bake_mean, bake_mean_observed, bake_sigma, bake_sigma_observed};
 #[cfg(feature = "fit")]
 pub use compress::{CellWeights, CompressOptions, InducingSize, compress};
 #[cfg(feature = "fit")]

@@ -46,7 +46,8 @@ fn directions() -> Vec<HalfDiff> {
 }
 
 fn close(found: f64, expected: f64, tolerance: f64) {
-    assert!((found - expected).abs() <= tolerance * expected.abs(), "{found:e} {expected:e}");
+    // Sums of terms of about 1 may cancel.
+    assert!((found - expected).abs() <= tolerance * expected.abs() + 1e-15, "{found:e} {expected:e}");
 }
 
 /// Compares the predictions and the baked tables of a model with the target and the latent variance that are

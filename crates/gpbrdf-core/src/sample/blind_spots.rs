@@ -69,7 +69,7 @@ impl SampleSet {
 }
 
 /// Whether light, viewer and normal lie in one plane, within a degree.
-fn is_in_plane(angles: HalfDiff) -> bool {
+pub(crate) fn is_in_plane(angles: HalfDiff) -> bool {
     let (wi, wo) = angles.to_directions();
     // The part of the viewer's direction across the plane of light and normal, and the other way round.
     let across = wi.cross(&wo).z.abs();

@@ -1,7 +1,7 @@
 //! Where to measure, what was measured, and how measurements become inputs of kernels and targets of
 //! processes.
 
-mod blind_spots;
+pub(crate) mod blind_spots;
 mod detect;
 mod disturbance;
 pub(crate) mod lattice;

@@ -122,6 +122,9 @@ pub enum InputSpace {
     /// but with the angle between light and half vector for itself, which suits materials that send light back
     /// to where it came from.
     DifferenceAngle,
+    /// `((theta_h / (pi/2))^0.7, v, 0)` with `v = min(theta_d / theta_d_max, 1)`: functions that do not depend on
+    /// `phi_d` between the horizons. Samples that all lie in the plane of incidence say nothing about `phi_d`.
+    PlaneOfIncidence,
     /// `(theta_h, theta_d, phi_d)` in radians, without a warp. This is the paper's own setting.
     HalfDiff,
 }
@@ -143,6 +146,10 @@ impl InputSpace {
                 let (half, [light, viewer]) = polar_coordinates(angles);
                 [half, above_horizon(angles) / FRAC_PI_2, (light - viewer).abs()]
             }
+            Self::PlaneOfIncidence => {
+                let v = BoxPoint::from_half_diff(angles).v.min(1.0);
+                [(angles.theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT), v, 0.0]
+            }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
     }
@@ -154,7 +161,7 @@ impl InputSpace {
     pub fn validate(self) -> Result<()> {
         match self {
             Self::WarpedBox(warped) => warped.validate(),
-            Self::PolarAngles | Self::DifferenceAngle | Self::HalfDiff => Ok(()),
+            Self::PolarAngles | Self::DifferenceAngle | Self::PlaneOfIncidence | Self::HalfDiff => Ok(()),
         }
     }
 
@@ -175,7 +182,7 @@ impl InputSpace {
     /// meaning.
     #[must_use]
     pub fn is_isotropic(self) -> bool {
-        matches!(self, Self::PolarAngles | Self::DifferenceAngle)
+        matches!(self, Self::PolarAngles | Self::DifferenceAngle | Self::PlaneOfIncidence)
     }
 
     /// The length scales that reflectances usually have along each coordinate: the median, and the standard
@@ -190,6 +197,8 @@ impl InputSpace {
             Self::WarpedBox(_) => [(0.3, 0.8), (0.6, 0.8), (1.0, 0.8)],
             Self::PolarAngles => [(0.2, 0.8), (1.05, 0.5), (1.6, 0.4)],
             Self::DifferenceAngle => [(0.2, 0.8), (0.35, 0.6), (1.6, 0.5)],
+            // The last coordinate is the same everywhere.
+            Self::PlaneOfIncidence => [(0.2, 0.8), (0.35, 0.6), (0.01, 0.2)],
             Self::HalfDiff => [(0.4, 0.8), (0.8, 0.8), (1.5, 0.8)],
         }
     }

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use eframe::egui::Color32;
 use gpbrdf_core::judge::{CellMetrics, ImageMetrics, LeftOut};
-use gpbrdf_core::{Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Rgb, SampleSet, Source};
+use gpbrdf_core::{
+    Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Progress, Rgb, SampleSet, Source,
+};
 
 use crate::job::{ModelSpec, Stage};
 
@@ -42,9 +44,8 @@ pub(crate) enum Work {
     Idle,
     /// A request has been made and the fitter has not begun it.
     Waiting,
-    /// The fitter is in a stage of the request that began at `since`, after so many evaluations of the
-    /// likelihood.
-    Running { stage: Stage, since: Instant, evaluations: usize },
+    /// The fitter is in a stage that began at `begun`, of a request that began at `since`, and has come so far in it.
+    Running { stage: Stage, since: Instant, begun: Instant, progress: Progress },
     /// The user has cancelled it.
     Cancelled,
     /// It ended with an error.

@@ -8,12 +8,11 @@ use std::time::Instant;
 
 use anyhow::Result;
 use gpbrdf_core::judge::CellMetrics;
-use gpbrdf_core::{BrdfTable, Source};
+use gpbrdf_core::{BrdfTable, Progress, Source};
 
 use super::outbox::Outbox;
 use crate::job::{
-    Backend, Baking, Found, Job, Judging, Measured, ModelSpec, Observer, Progress, Run, Stage, Truth,
-    is_cancelled,
+    Backend, Baking, Found, Job, Judging, Measured, ModelSpec, Observer, Run, Stage, Truth, is_cancelled,
 };
 use crate::viewer::state::document::{Document, DocumentId, Fitted, Work};
 
@@ -27,8 +26,10 @@ pub(crate) struct Report {
 /// One thing to report.
 #[derive(Debug)]
 pub(crate) enum News {
-    /// A stage of the request has begun, or the search has evaluated the likelihood so many times.
-    Stage { stage: Stage, evaluations: usize },
+    /// A stage of the request has begun.
+    Stage(Stage),
+    /// How far the stage has come.
+    Progress(Progress),
     /// A model and its mean.
     Fitted(Box<Fitted>),
     /// Sigma of a result.
@@ -49,12 +50,18 @@ impl News {
     pub(crate) fn apply(self, document: &mut Document) {
         let cancelled = document.work == Work::Cancelled;
         match self {
-            Self::Stage { stage, evaluations } if !cancelled => {
+            Self::Stage(stage) if !cancelled => {
+                let begun = Instant::now();
                 let since = match document.work {
                     Work::Running { since, .. } if stage != Stage::Sample => since,
-                    _ => Instant::now(),
+                    _ => begun,
                 };
-                document.work = Work::Running { stage, since, evaluations };
+                document.work = Work::Running { stage, since, begun, progress: Progress::default() };
+            }
+            Self::Progress(now) => {
+                if let Work::Running { progress, .. } = &mut document.work {
+                    *progress = now;
+                }
             }
             Self::Fitted(fitted) => {
                 if document.spec.hyper.is_none() {
@@ -74,7 +81,7 @@ impl News {
                 }
             }
             Self::Done if !cancelled => document.work = Work::Idle,
-            Self::Stage { .. } | Self::Done => {}
+            Self::Stage(_) | Self::Done => {}
             Self::Failed(message) => document.work = Work::Failed(message),
         }
     }
@@ -253,12 +260,18 @@ struct Follower {
     cancel: Arc<AtomicBool>,
     kept: Kept,
     outbox: Outbox<Report>,
+    /// The progress that was last reported.
+    told: Mutex<Progress>,
 }
+
+/// The progress is reported after so many evaluations, or after such a share.
+const EVALUATIONS: usize = 8;
+const SHARE: f64 = 0.005;
 
 impl Follower {
     fn new(request: &Request, cancel: Arc<AtomicBool>, kept: Kept, outbox: Outbox<Report>) -> Self {
         let version = VERSION.fetch_add(1, Ordering::Relaxed);
-        Self { document: request.document, version, cancel, kept, outbox }
+        Self { document: request.document, version, cancel, kept, outbox, told: Mutex::default() }
     }
 
     fn tell(&self, news: News) {
@@ -273,14 +286,18 @@ impl Follower {
 
 impl Observer for Follower {
     fn begin(&self, stage: Stage) {
-        self.tell(News::Stage { stage, evaluations: 0 });
+        *self.told.lock().unwrap_or_else(PoisonError::into_inner) = Progress::default();
+        self.tell(News::Stage(stage));
     }
 
     fn progress(&self, progress: Progress) {
-        if let Progress::Evaluations(evaluations) = progress
-            && evaluations.is_multiple_of(8)
+        // Another thread that is at it reports nearly the same.
+        let Ok(mut told) = self.told.try_lock() else { return };
+        let share = |progress: &Progress| progress.share.unwrap_or_default();
+        if progress.evaluations >= told.evaluations + EVALUATIONS || share(&progress) >= share(&told) + SHARE
         {
-            self.tell(News::Stage { stage: Stage::Fit, evaluations });
+            *told = progress;
+            self.tell(News::Progress(progress));
         }
     }
 

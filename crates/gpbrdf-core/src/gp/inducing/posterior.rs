@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::{COLOUR_CONSTANTS, InducingComponent, InducingGp, InducingShape};
 use crate::base::error::Result;
+use crate::base::watch::Watch;
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::table::{N_CELLS, SLAB, cell_index};
 use crate::gp::hyper::Hyper;
@@ -144,7 +145,7 @@ impl Posterior for InducingGp {
 
     /// Keeps the components in single precision until they are mixed, which rounds them to about 1e-7 of
     /// their size.
-    fn bake_mean(&self, table: &mut MeanTable<'_>) {
+    fn bake_mean(&self, table: &mut MeanTable<'_>, _watch: &Watch) -> Result<()> {
         for (k, component) in self.components.iter().enumerate() {
             let slabs = table.cells.par_chunks_mut(SLAB);
             bake_means(component.gp(), component.lattice().space, slabs, |slab, rows, means| {
@@ -165,9 +166,10 @@ impl Posterior for InducingGp {
                 cell.iter_mut().zip(values).for_each(|(out, &value)| *out = to_f32(value));
             }
         });
+        Ok(())
     }
 
-    fn bake_sigma(&self) -> Result<Vec<Vec<f32>>> {
+    fn bake_sigma(&self, _watch: &Watch) -> Result<Vec<Vec<f32>>> {
         let mut planes = vec![vec![0.0f32; N_CELLS]; 3];
         for (component, plane) in self.components.iter().zip(&mut planes) {
             let slabs = plane.par_chunks_mut(SLAB);

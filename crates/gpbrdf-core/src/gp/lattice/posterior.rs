@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::table::{bake_means, bake_variances};
 use super::{LatticeData, LatticeGp, LatticeHyper};
 use crate::base::error::Result;
+use crate::base::watch::Watch;
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::table::{N_CELLS, N_THETA_D, SLAB, cell_index};
 use crate::gp::hyper::{AXIS_NAMES, Hyper};
@@ -141,7 +142,7 @@ impl Posterior for LatticePosterior {
         DeviceForm::Separable(vec![SeparablePart { gp: &self.gp, space: self.space, colour: None }])
     }
 
-    fn bake_mean(&self, table: &mut MeanTable<'_>) {
+    fn bake_mean(&self, table: &mut MeanTable<'_>, _watch: &Watch) -> Result<()> {
         let (first, offsets, transform) = (table.first_channel, table.offsets, table.transform);
         let slabs = table.cells.par_chunks_mut(SLAB);
         bake_means(&self.gp, self.space, slabs, |slab, rows, means| {
@@ -153,9 +154,10 @@ impl Posterior for LatticePosterior {
                 }
             }
         });
+        Ok(())
     }
 
-    fn bake_sigma(&self) -> Result<Vec<Vec<f32>>> {
+    fn bake_sigma(&self, _watch: &Watch) -> Result<Vec<Vec<f32>>> {
         let mut plane = vec![0.0f32; N_CELLS];
         let slabs = plane.par_chunks_mut(SLAB);
         bake_variances(&self.gp, self.space, slabs, |slab, rows, variances| {

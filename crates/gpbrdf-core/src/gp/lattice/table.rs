@@ -140,7 +140,10 @@ impl Column {
         for (weights, means) in weights.iter().zip(means.chunks_exact_mut(N_THETA_D)) {
             let (sums, below) = means.split_at_mut(count);
             let weights: Vec<f64> = weights.row(row).iter().copied().collect();
-            vectorized(|| weighted_sum(&weights, &self.kernels, sums));
+            vectorized(
+                #[inline(always)]
+                || weighted_sum(&weights, &self.kernels, sums),
+            );
             below.fill(sums[count - 1]);
         }
     }
@@ -150,7 +153,10 @@ impl Column {
         let count = self.v.len();
         let (sums, below) = variances.split_at_mut(count);
         let weights: Vec<f64> = weights.row(row).iter().copied().collect();
-        vectorized(|| weighted_sum_of_squares(&weights, &self.projected, sums));
+        vectorized(
+            #[inline(always)]
+            || weighted_sum_of_squares(&weights, &self.projected, sums),
+        );
         sums.iter_mut().for_each(|x| *x = (scale * (prior - *x)).max(0.0));
         below.fill(sums[count - 1]);
     }

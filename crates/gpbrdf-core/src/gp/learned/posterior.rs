@@ -237,6 +237,7 @@ impl Posterior for LearnedPosterior {
             let Part { gp, space, .. } = &self.parts[colour as usize];
             gp.variance_at(&points(*space, angles), &self.adapted.features(colour, angles))
         });
+        let (bright, coloured) = (bright?, coloured?);
         Ok(bright.into_iter().zip(coloured).map(|(a, c)| variance_of_channels(a, c)).collect())
     }
 

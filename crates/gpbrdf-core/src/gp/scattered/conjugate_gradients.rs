@@ -1,12 +1,15 @@
 //! Preconditioned conjugate gradients for several right-hand sides at once, and the determinant that comes with
 //! them.
 
+use rayon::prelude::*;
+
 use super::preconditioner::Preconditioner;
 use super::product::Covariance;
 use crate::base::error::{Error, Result};
 use crate::base::linalg::symmetric_eigen;
 use crate::base::random::SplitMix64;
-use crate::base::simd::dot;
+use crate::base::simd::{add_scaled, dot};
+use crate::base::watch::Watch;
 
 /// The search ends when every residual, measured by the preconditioner, is this small relative to its
 /// right-hand side. That is the error of the solution in standard deviations of the samples given each other.
@@ -31,7 +34,7 @@ pub(super) struct Solution {
 }
 
 /// Solves `K x = y` for the columns of `y`, each of length `n`, with all columns sharing every product, and
-/// estimates `ln det K`. `watch` is called before each product; an error that it returns ends the search.
+/// estimates `ln det K`.
 ///
 /// Source: M. R. Hestenes and E. Stiefel, "Methods of Conjugate Gradients for Solving Linear Systems" (1952),
 /// with the preconditioner `M^-1` of [`Preconditioner`]. Residuals are measured by `r^T M^-1 r`. The determinant
@@ -41,12 +44,13 @@ pub(super) struct Solution {
 /// al., "`GPyTorch`: Blackbox Matrix-Matrix Gaussian Process Inference with GPU Acceleration" (2018), section 4.
 ///
 /// # Errors
-/// A residual that is still above 1e-2 after 400 products, and the errors of `watch`.
+/// A residual that is still above 1e-2 after 400 products, and [`Error::Cancelled`] where the observer stops the
+/// work.
 pub(super) fn solve(
     covariance: &Covariance<'_>,
     preconditioner: &Preconditioner,
     y: &[f64],
-    watch: &dyn Fn() -> Result<()>,
+    watch: &Watch,
 ) -> Result<Solution> {
     let n = covariance.points.len();
     let systems = y.len() / n;
@@ -55,43 +59,21 @@ pub(super) fn solve(
     for _ in 0..PROBES {
         r.extend(preconditioner.sample(&mut || random.next_normal()));
     }
-    let mut columns: Vec<Column> = (0..systems + PROBES).map(|c| Column::new(c * n..(c + 1) * n)).collect();
-    let mut x = vec![0.0; r.len()];
-    let mut z = vec![0.0; r.len()];
-    for column in &mut columns {
-        let at = column.at.clone();
-        preconditioner.apply(&r[at.clone()], &mut z[at.clone()]);
-        column.energy = dot(&r[at.clone()], &z[at]);
-        column.start = column.energy;
-    }
-    let mut p = z.clone();
+    let mut columns: Vec<Column> = r.par_chunks(n).map(|r| Column::new(r.to_vec(), preconditioner)).collect();
+    let mut directions: Vec<f64> = columns.iter().flat_map(|column| &column.z).copied().collect();
     let mut product = vec![0.0; r.len()];
     let residual = |columns: &[Column]| columns[..systems].iter().map(Column::residual).fold(0.0, f64::max);
     let mut iterations = 0;
     while residual(&columns) > TOLERANCE && iterations < MOST_ITERATIONS {
-        watch()?;
-        covariance.apply(&p, &mut product);
-        for column in &mut columns {
-            let at = column.at.clone();
-            let curvature = dot(&p[at.clone()], &product[at.clone()]);
-            // A column that is solved stays as it is.
-            if column.residual() <= 0.1 * TOLERANCE || curvature <= 0.0 {
-                continue;
-            }
-            let step = column.energy / curvature;
-            for k in at.clone() {
-                x[k] += step * p[k];
-                r[k] -= step * product[k];
-            }
-            preconditioner.apply(&r[at.clone()], &mut z[at.clone()]);
-            let next = dot(&r[at.clone()], &z[at.clone()]);
-            let factor = next / column.energy;
-            for k in at {
-                p[k] = z[k] + factor * p[k];
-            }
-            column.steps.push((step, factor));
-            column.energy = next;
-        }
+        // Residuals shrink by about the same factor in every product.
+        let share = residual(&columns).ln() / TOLERANCE.ln();
+        let next = if iterations > 0 { share * (1.0 + (iterations as f64).recip()) } else { 0.05 };
+        let watch = watch.part(share.clamp(0.0, 1.0), next.clamp(0.0, 1.0));
+        covariance.apply(&directions, &mut product, &watch)?;
+        let parts = directions.par_chunks_mut(n).zip(product.par_chunks(n));
+        columns.par_iter_mut().zip(parts).for_each(|(column, (p, product))| {
+            column.advance(p, product, preconditioner);
+        });
         iterations += 1;
     }
     let left = residual(&columns);
@@ -99,7 +81,7 @@ pub(super) fn solve(
         let found = format!("{left:.1e} after {iterations} products");
         return Err(Error::argument("residual of the weights", "below 0.01", found));
     }
-    x.truncate(y.len());
+    let x = columns[..systems].iter().flat_map(|column| &column.x).copied().collect();
     let probes = &columns[systems..];
     let trace = probes.iter().map(Column::log_quadrature).sum::<f64>() / PROBES as f64;
     Ok(Solution { x, log_det: preconditioner.log_det() + trace })
@@ -107,7 +89,10 @@ pub(super) fn solve(
 
 /// The search for one right-hand side.
 struct Column {
-    at: std::ops::Range<usize>,
+    /// The solution so far, its residual, and `M^-1` times the residual.
+    x: Vec<f64>,
+    r: Vec<f64>,
+    z: Vec<f64>,
     /// `r^T M^-1 r` at the start and now.
     start: f64,
     energy: f64,
@@ -116,8 +101,29 @@ struct Column {
 }
 
 impl Column {
-    fn new(at: std::ops::Range<usize>) -> Self {
-        Self { at, start: 0.0, energy: 0.0, steps: Vec::new() }
+    fn new(r: Vec<f64>, preconditioner: &Preconditioner) -> Self {
+        let mut z = vec![0.0; r.len()];
+        preconditioner.apply(&r, &mut z);
+        let energy = dot(&r, &z);
+        Self { x: vec![0.0; r.len()], r, z, start: energy, energy, steps: Vec::new() }
+    }
+
+    /// Goes along the direction `p`, whose product with the covariance is known, and turns it into the next one.
+    fn advance(&mut self, p: &mut [f64], product: &[f64], preconditioner: &Preconditioner) {
+        let curvature = dot(p, product);
+        // A column that is solved stays as it is.
+        if self.residual() <= 0.1 * TOLERANCE || curvature <= 0.0 {
+            return;
+        }
+        let step = self.energy / curvature;
+        add_scaled(step, p, &mut self.x);
+        add_scaled(-step, product, &mut self.r);
+        preconditioner.apply(&self.r, &mut self.z);
+        let next = dot(&self.r, &self.z);
+        let factor = next / self.energy;
+        p.iter_mut().zip(&self.z).for_each(|(p, z)| *p = z + factor * *p);
+        self.steps.push((step, factor));
+        self.energy = next;
     }
 
     fn residual(&self) -> f64 {

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::conditional::Basis;
 use super::product::Covariance;
+use crate::base::watch::Watch;
 use crate::gp::cost::FitCost;
 use crate::kernel::{Kernel, Points, Shape};
 
@@ -21,6 +22,16 @@ const BYTES: f64 = 8.0 * (2.0 * 200.0 + 1.5 * 48.0 + 9.0 * (5.0 + 16.0));
 
 /// Time of the search itself, relative to that of a kernel value.
 const SEARCH: f64 = 3e8;
+
+/// Evaluations of the likelihood that a search usually takes, both spaces and all renewed weights together.
+pub(super) const EVALUATIONS: usize = 110;
+
+/// The share of the time of a fit that its search takes.
+pub(super) fn search_share(samples: usize) -> f64 {
+    let n = samples as f64;
+    let search = SEARCH * (n / 1000.0).min(1.0) + 0.5 * PER_SAMPLE * n;
+    search / (search + 0.5 * PER_SAMPLE * n + PRODUCTS * 0.5 * n * n)
+}
 
 /// Memory and time of one fit to `samples` scattered samples. The time is usually right to within a factor of 1.5;
 /// without noise more products are needed.
@@ -51,7 +62,8 @@ fn seconds_per_value() -> f64 {
         let (y, mut out) = (vec![1.0; 3 * N], vec![0.0; 3 * N]);
         let time = |_| {
             let start = Instant::now();
-            covariance.apply(&y, &mut out);
+            // Without an observer, nothing ends this early.
+            let _ = covariance.apply(&y, &mut out, &Watch::default());
             start.elapsed().as_secs_f64()
         };
         let seconds = (0..3).map(time).fold(f64::INFINITY, f64::min);

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::conditional::{Basis, JITTER, Process, Scratch};
 use super::conjugate_gradients;
+use super::cost::{EVALUATIONS, search_share};
 use super::exact;
 use super::neighbours::{Embedded, Neighbours, scrambled_order};
 use super::preconditioner::Preconditioner;
@@ -13,6 +14,7 @@ use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
 use crate::base::simd::{add_scaled, dot};
+use crate::base::watch::Watch;
 use crate::gp::problem::{BasisTerm, Outliers, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
@@ -40,6 +42,9 @@ const DEGREES_OF_FREEDOM: f64 = 4.0;
 /// A sample is suspected where the mean square of its standardised leave-one-out residuals exceeds this: six
 /// standard deviations in every channel.
 const SUSPICIOUS: f64 = 36.0;
+
+/// Number of samples that are left out before somebody may stop the work.
+const STEP: usize = 8;
 
 /// Number of nearest samples with which a suspected one is compared.
 const WITNESSES: usize = 12;
@@ -169,8 +174,8 @@ impl<'a> Search<'a> {
         };
         for round in 0..WEIGHT_ROUNDS {
             self.take_optimum()?;
-            let changed =
-                self.problem.outliers == Outliers::Downweight && self.state.renew_weights(&self.data);
+            let changed = self.problem.outliers == Outliers::Downweight
+                && self.state.renew_weights(&self.data, self.problem.watch)?;
             // Neighbours are those of the length scales that were found; weights are renewed until they stay.
             if !changed && (round > 0 || n <= conditioned_on(n)) {
                 break;
@@ -216,13 +221,15 @@ fn maximise(
     let neighbours = if is_exact {
         Neighbours::default()
     } else {
-        Embedded::new(&data.x, &state.kernel).nearest_before(conditioned_on(n))
+        let count = conditioned_on(n);
+        Embedded::new(&data.x, &state.kernel).nearest_before(count, &problem.watch.part(0.0, 0.0))?
     };
+    let until = search_share(n);
     let subset = evenly(n, TERMS);
     let scale = n as f64 / subset.len() as f64;
     let mut kernel = state.kernel.clone();
     maximize(&start.parameters, n * data.y.len(), options, |p| {
-        problem.watch.evaluation()?;
+        problem.watch.evaluation_towards(EVALUATIONS, until)?;
         let others = start.set(&mut kernel, p)?;
         let (shared, all) = data.noise(others.noise_variance, &state.weights);
         let process = Process {
@@ -254,10 +261,10 @@ fn evenly(n: usize, count: usize) -> Vec<u32> {
 impl State {
     /// Every sample as it is predicted from the nearest others, in the scrambled order: residuals, rows with one
     /// value per channel, and variances of a measurement of weight 1.
-    fn leave_one_out(&self, data: &Data) -> (Vec<f64>, Vec<f64>, Neighbours) {
+    fn leave_one_out(&self, data: &Data, watch: &Watch) -> Result<(Vec<f64>, Vec<f64>, Neighbours)> {
         let (_, all) = data.noise(self.noise_variance, &self.weights);
         let process = self.process(data, &all);
-        let nearest = Embedded::new(&data.x, &self.kernel).nearest_others(NEAREST);
+        let nearest = Embedded::new(&data.x, &self.kernel).nearest_others(NEAREST, &watch.part(0.0, 0.2))?;
         let of_measurement = |i: usize, latent: f64| latent + self.noise_variance + data.known_noise[i];
         if data.basis.count > 0
             && data.len() <= exact::MOST_SAMPLES
@@ -265,32 +272,37 @@ impl State {
         {
             let latent = variances.iter().zip(&all).map(|(v, noise)| (v - noise).max(0.0));
             let variances = latent.enumerate().map(|(i, latent)| of_measurement(i, latent)).collect();
-            return (residuals, variances, nearest);
+            return Ok((residuals, variances, nearest));
         }
+        let left_out = watch.part(0.2, 1.0);
+        let steps = left_out.steps(data.len() / STEP);
         let rows: Vec<(Vec<f64>, f64)> = (0..data.len())
             .into_par_iter()
             .map_init(
                 || Scratch::new(NEAREST),
                 |scratch, i| {
+                    if i % STEP == STEP - 1 {
+                        steps.take()?;
+                    }
                     let given = nearest.of(i);
                     let (b, latent) = scratch.condition(&process, i, given);
                     let residual = |y: &Vec<f64>| {
                         y[i] - b.iter().zip(given).map(|(b, &j)| b * y[j as usize]).sum::<f64>()
                     };
                     let residuals = data.y.iter().map(residual).collect();
-                    (residuals, of_measurement(i, latent))
+                    Ok((residuals, of_measurement(i, latent)))
                 },
             )
-            .collect();
+            .collect::<Result<_>>()?;
         let (residuals, variances): (Vec<Vec<f64>>, Vec<f64>) = rows.into_iter().unzip();
-        (residuals.concat(), variances, nearest)
+        Ok((residuals.concat(), variances, nearest))
     }
 
     /// Gives suspected outliers the weights of Student's t distribution, all others the weight 1. Returns whether
     /// any weight has changed by more than a factor of 2.
-    fn renew_weights(&mut self, data: &Data) -> bool {
+    fn renew_weights(&mut self, data: &Data, watch: &Watch) -> Result<bool> {
         let channels = data.y.len();
-        let (residuals, variances, nearest) = self.leave_one_out(data);
+        let (residuals, variances, nearest) = self.leave_one_out(data, &watch.part(0.0, 0.0))?;
         let square = |i: usize| {
             let row = &residuals[i * channels..(i + 1) * channels];
             row.iter().map(|r| r * r).sum::<f64>() / variances[i]
@@ -318,12 +330,15 @@ impl State {
             changed |= !(0.5..=2.0).contains(&ratio);
             self.weights[i] = weight;
         }
-        changed
+        Ok(changed)
     }
 
     /// Adds what the samples say about themselves to a report: predictions from all others, and weights.
-    pub(super) fn report_samples(&self, data: &Data, report: &mut FitReport) {
-        let (residuals, variances, _) = self.leave_one_out(data);
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn report_samples(&self, data: &Data, watch: &Watch, report: &mut FitReport) -> Result<()> {
+        let (residuals, variances, _) = self.leave_one_out(data, watch)?;
         let density = residuals.chunks(data.y.len()).zip(&variances).map(|(row, v)| {
             row.iter().map(|r| -0.5 * ((std::f64::consts::TAU * v).ln() + r * r / v)).sum::<f64>()
         });
@@ -335,15 +350,17 @@ impl State {
         if self.weights.iter().any(|&w| w != 1.0) {
             report.weights = data.as_given(&self.weights, 1);
         }
+        Ok(())
     }
 
     /// Conditions the process. The second value is the log likelihood over all samples.
-    pub(super) fn condition(self, problem: &Problem<'_>, data: &Data) -> Result<(ScatteredGp, f64)> {
+    pub(super) fn condition(self, watch: &Watch, data: &Data) -> Result<(ScatteredGp, f64)> {
         let n = data.len();
-        let neighbours = Embedded::new(&data.x, &self.kernel).nearest_before(NEAREST);
+        let embedded = Embedded::new(&data.x, &self.kernel);
+        let neighbours = embedded.nearest_before(NEAREST, &watch.part(0.0, 0.02))?;
         let (_, all) = data.noise(self.noise_variance, &self.weights);
         let process = self.process(data, &all);
-        let preconditioner = Preconditioner::new(&process, neighbours);
+        let preconditioner = Preconditioner::new(&process, neighbours, &watch.part(0.02, 0.1))?;
         let points = Points::new(&data.x, &self.kernel.metric);
         let jitter = JITTER * self.kernel.prior_variance();
         let diagonal: Vec<f64> = all.iter().map(|noise| noise + jitter).collect();
@@ -355,8 +372,7 @@ impl State {
             basis_variance: self.basis_variance,
         };
         let y = data.y.concat();
-        let solution =
-            conjugate_gradients::solve(&covariance, &preconditioner, &y, &|| problem.watch.evaluation())?;
+        let solution = conjugate_gradients::solve(&covariance, &preconditioner, &y, &watch.part(0.1, 1.0))?;
         let channels = data.y.len();
         let constant = channels as f64 * (n as f64 * std::f64::consts::TAU.ln() + solution.log_det);
         let value = -0.5 * (dot(&y, &solution.x) + constant);

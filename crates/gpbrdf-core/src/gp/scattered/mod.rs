@@ -33,6 +33,7 @@ use self::neighbours::Embedded;
 use self::preconditioner::{FarField, Preconditioner};
 use crate::base::error::{Error, Result};
 use crate::base::simd::add_scaled;
+use crate::base::watch::Watch;
 use crate::kernel::{Kernel, Points};
 
 /// The number of nearest samples on which variances, leave-one-out predictions and the preconditioner are
@@ -182,13 +183,22 @@ impl ScatteredGp {
     /// per point. The first call on a loaded process
     /// computes the uncertainty of the inducing points. Cost: one distance to every sample, 1,200 kernel values
     /// and 300,000 multiply-adds per point.
-    pub(crate) fn variance_at(&self, x: &[f64], basis: &[f64]) -> Vec<f64> {
-        let process = self.process();
-        let far_field = self.far_field.get_or_init(|| {
-            Preconditioner::new(&process, self.embedded.nearest_before(NEAREST)).into_far_field()
-        });
-        let nearest = self.embedded.nearest_to(&Embedded::new(x, &self.kernel), NEAREST);
-        x.par_chunks(self.kernel.dimension())
+    ///
+    /// # Errors
+    /// None without an observer.
+    pub(crate) fn variance_at(&self, x: &[f64], basis: &[f64]) -> Result<Vec<f64>> {
+        let (process, watch) = (self.process(), Watch::default());
+        let far_field = match self.far_field.get() {
+            Some(far_field) => far_field,
+            None => {
+                let neighbours = self.embedded.nearest_before(NEAREST, &watch)?;
+                let far_field = Preconditioner::new(&process, neighbours, &watch)?.into_far_field();
+                self.far_field.get_or_init(|| far_field)
+            }
+        };
+        let nearest = self.embedded.nearest_to(&Embedded::new(x, &self.kernel), NEAREST, &watch)?;
+        let variances = x
+            .par_chunks(self.kernel.dimension())
             .enumerate()
             .map_init(
                 || Scratch::new(NEAREST),
@@ -197,7 +207,8 @@ impl ScatteredGp {
                     far_field.variance(&process, (point, own), nearest.of(j), scratch)
                 },
             )
-            .collect()
+            .collect();
+        Ok(variances)
     }
 
     fn process(&self) -> Process<'_> {

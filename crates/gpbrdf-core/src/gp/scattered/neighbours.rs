@@ -2,13 +2,18 @@
 
 use rayon::prelude::*;
 
+use crate::base::error::Result;
 #[cfg(feature = "fit")]
 use crate::base::random::SplitMix64;
 use crate::base::simd::vectorized;
+use crate::base::watch::Watch;
 use crate::kernel::{AxisMetric, Kernel, KernelBody};
 
 /// Number of points whose distances are computed at a time.
 const STRIP: usize = 256;
+
+/// Number of points whose neighbours are found before somebody may stop the work.
+const STEP: usize = 64;
 
 /// An order of the samples that looks random but depends on nothing except their coordinates and targets, so
 /// that results do not depend on the order in which samples were given. `x` has `n` rows of `dimension`
@@ -76,16 +81,19 @@ impl Embedded {
         for start in (0..limit).step_by(STRIP) {
             let n = STRIP.min(limit - start);
             let d2 = &mut d2[..n];
-            let lowest = vectorized(|| {
-                for (k, (axis, to)) in self.axes.iter().zip(&other.axes).enumerate() {
-                    let to = to[j];
-                    for (d2, x) in d2.iter_mut().zip(&axis[start..start + n]) {
-                        let square = (x - to) * (x - to);
-                        *d2 = if k == 0 { square } else { *d2 + square };
+            let lowest = vectorized(
+                #[inline(always)]
+                || {
+                    for (k, (axis, to)) in self.axes.iter().zip(&other.axes).enumerate() {
+                        let to = to[j];
+                        for (d2, x) in d2.iter_mut().zip(&axis[start..start + n]) {
+                            let square = (x - to) * (x - to);
+                            *d2 = if k == 0 { square } else { *d2 + square };
+                        }
                     }
-                }
-                d2.iter().fold(f64::INFINITY, |low, &d| if d < low { d } else { low })
-            });
+                    d2.iter().fold(f64::INFINITY, |low, &d| if d < low { d } else { low })
+                },
+            );
             if lowest > worst {
                 continue;
             }
@@ -105,35 +113,46 @@ impl Embedded {
     }
 
     /// For every point, its nearest ones among those before it in the order.
-    pub(super) fn nearest_before(&self, count: usize) -> Neighbours {
-        self.of_all(self, count, |i| (i, None))
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn nearest_before(&self, count: usize, watch: &Watch) -> Result<Neighbours> {
+        self.of_all(self, count, watch, |i| (i, None))
     }
 
     /// For every point, its nearest ones among all others.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
     #[cfg(feature = "fit")]
-    pub(super) fn nearest_others(&self, count: usize) -> Neighbours {
-        self.of_all(self, count, |i| (self.len, Some(i)))
+    pub(super) fn nearest_others(&self, count: usize, watch: &Watch) -> Result<Neighbours> {
+        self.of_all(self, count, watch, |i| (self.len, Some(i)))
     }
 
     /// For every one of `points`, the nearest of these points.
-    pub(super) fn nearest_to(&self, points: &Self, count: usize) -> Neighbours {
-        self.of_all(points, count, |_| (self.len, None))
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn nearest_to(&self, points: &Self, count: usize, watch: &Watch) -> Result<Neighbours> {
+        self.of_all(points, count, watch, |_| (self.len, None))
     }
 
     fn of_all(
         &self,
         points: &Self,
         count: usize,
+        watch: &Watch,
         among: impl Fn(usize) -> (usize, Option<usize>) + Sync,
-    ) -> Neighbours {
-        let sets: Vec<Vec<u32>> = (0..points.len)
-            .into_par_iter()
-            .map_init(Vec::new, |found, j| {
-                self.nearest(among(j), (points, j), count, found);
-                found.iter().map(|&(_, i)| i).collect()
-            })
-            .collect();
-        Neighbours { sets }
+    ) -> Result<Neighbours> {
+        let steps = watch.steps(points.len / STEP);
+        let sets = (0..points.len).into_par_iter().map_init(Vec::new, |found, j| {
+            if j % STEP == STEP - 1 {
+                steps.take()?;
+            }
+            self.nearest(among(j), (points, j), count, found);
+            Ok(found.iter().map(|&(_, i)| i).collect())
+        });
+        Ok(Neighbours { sets: sets.collect::<Result<_>>()? })
     }
 }
 
@@ -193,7 +212,7 @@ mod tests {
 
     #[test]
     fn neighbours_are_those_of_the_sorted_distances() {
-        let x = points(700);
+        let (x, watch) = (points(700), Watch::default());
         let to = points(20);
         for kernel in test_kernels() {
             let (all, others) = (Embedded::new(&x, &kernel), Embedded::new(&to, &kernel));
@@ -217,8 +236,9 @@ mod tests {
                     assert!((distance(&x[3 * found..3 * found + 3], to) - d2).abs() < 1e-12);
                 }
             };
-            let (before, without) = (all.nearest_before(9), all.nearest_others(9));
-            let nearby = all.nearest_to(&others, 12);
+            let (before, without) =
+                (all.nearest_before(9, &watch).unwrap(), all.nearest_others(9, &watch).unwrap());
+            let nearby = all.nearest_to(&others, 12, &watch).unwrap();
             for i in [0, 1, 5, 300, 699] {
                 let at = &x[3 * i..3 * i + 3];
                 same(before.of(i), at, nearest(at, i, usize::MAX, 9));

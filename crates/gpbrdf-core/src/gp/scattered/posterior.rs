@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -50,7 +51,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
 
 impl ScatteredPosterior {
     fn points(&self, angles: &[HalfDiff]) -> Vec<f64> {
-        angles.iter().flat_map(|&angles| self.space.coordinates(angles)).collect()
+        angles.par_iter().flat_map_iter(|&angles| self.space.coordinates(angles)).collect()
     }
 }
 
@@ -90,7 +91,7 @@ impl Posterior for ScatteredPosterior {
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
         match angles.iter().find(|angles| !angles.is_finite()) {
             Some(bad) => Err(Error::argument("angles", "finite numbers", format!("{bad:?}"))),
-            None => Ok(self.gp.variance_at(&self.points(angles), &[])),
+            None => self.gp.variance_at(&self.points(angles), &[]),
         }
     }
 

@@ -10,14 +10,19 @@ use rayon::prelude::*;
 
 use super::conditional::{JITTER, Process, Scratch};
 use super::neighbours::Neighbours;
+use crate::base::error::Result;
 use crate::base::linalg::{factorize, product_into_slice, solve_lower, view_slice};
 #[cfg(feature = "fit")]
 use crate::base::linalg::{half_log_det, solve};
 use crate::base::simd::{add_scaled, dot};
+use crate::base::watch::Watch;
 
 /// The largest number of inducing points, and the number of samples for each of them.
 const MOST_POINTS: usize = 200;
 const SAMPLES_PER_POINT: usize = 8;
+
+/// Number of samples that are conditioned before somebody may stop the work.
+const STEP: usize = 8;
 
 /// A matrix `B B^T` of low rank: `B = [sqrt(v) b(X), k(X, Z) L^-T]` with the basis `b`, the inducing points `Z`, which
 /// are the first samples, and the Cholesky factor `L` of `k(Z, Z)`.
@@ -34,7 +39,10 @@ struct LowRank {
 
 impl LowRank {
     /// The part of the first samples of the order; of none where their covariance cannot be factorised.
-    fn new(process: &Process<'_>) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    fn new(process: &Process<'_>, watch: &Watch) -> Result<Self> {
         let n = process.noise.len();
         let mut points = (n / SAMPLES_PER_POINT).min(MOST_POINTS);
         let mut factor = vec![0.0; points * points];
@@ -49,11 +57,19 @@ impl LowRank {
             points = 0;
         }
         let mut found = Self { basis: process.basis.count, points, factor, rows: Vec::new() };
-        if found.rank() > 0 {
-            let row = |i: usize| found.at(process, process.point(i), process.basis.row(i));
-            found.rows = (0..n).into_par_iter().flat_map_iter(row).collect();
+        let rank = found.rank();
+        if rank > 0 {
+            let (mut rows, steps) = (vec![0.0; n * rank], watch.steps(n / STEP));
+            rows.par_chunks_mut(rank).enumerate().try_for_each(|(i, row)| {
+                if i % STEP == STEP - 1 {
+                    steps.take()?;
+                }
+                row.copy_from_slice(&found.at(process, process.point(i), process.basis.row(i)));
+                Ok(())
+            })?;
+            found.rows = rows;
         }
-        found
+        Ok(found)
     }
 
     /// The number of columns of `B`.
@@ -154,13 +170,21 @@ pub(super) struct Preconditioner {
 
 impl Preconditioner {
     /// Computes all conditionals. Cost: `O(n m^2 (m + q))` with `m` neighbours and `q` inducing points.
-    pub(super) fn new(process: &Process<'_>, neighbours: Neighbours) -> Self {
-        let low_rank = LowRank::new(process);
-        let (coefficients, variances): (Vec<Vec<f64>>, Vec<f64>) = (0..neighbours.len())
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn new(process: &Process<'_>, neighbours: Neighbours, watch: &Watch) -> Result<Self> {
+        let low_rank = LowRank::new(process, &watch.part(0.0, 0.2))?;
+        let conditioning = watch.part(0.2, 1.0);
+        let steps = conditioning.steps(neighbours.len() / STEP);
+        let conditionals: Vec<(Vec<f64>, f64)> = (0..neighbours.len())
             .into_par_iter()
             .map_init(
                 || Scratch::new(neighbours.largest()),
                 |scratch, i| {
+                    if i % STEP == STEP - 1 {
+                        steps.take()?;
+                    }
                     let given = neighbours.of(i);
                     let at = |a: usize| given[a] as usize;
                     let (b, explained) = scratch.explain(
@@ -170,10 +194,11 @@ impl Preconditioner {
                         |a| low_rank.rest(process, i, at(a)),
                     );
                     let variance = low_rank.rest_variance(process, i) - explained;
-                    (b.to_vec(), variance.max(process.least_variance(i)))
+                    Ok((b.to_vec(), variance.max(process.least_variance(i))))
                 },
             )
-            .unzip();
+            .collect::<Result<_>>()?;
+        let (coefficients, variances): (Vec<Vec<f64>>, Vec<f64>) = conditionals.into_iter().unzip();
         let rank = low_rank.rank();
         let mut whitened = vec![0.0; low_rank.rows.len()];
         let mut capacitance = vec![0.0; rank * rank];
@@ -192,7 +217,7 @@ impl Preconditioner {
             // The identity makes it positive definite.
             factorize(&mut capacitance, rank);
         }
-        Self { neighbours, low_rank, coefficients, variances, whitened, capacitance }
+        Ok(Self { neighbours, low_rank, coefficients, variances, whitened, capacitance })
     }
 
     /// What variances need of this.

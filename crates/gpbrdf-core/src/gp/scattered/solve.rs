@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::cost::search_share;
 use super::fit::{Data, Search, State};
 use super::posterior::ScatteredPosterior;
 use super::{ScatteredGp, exact};
@@ -12,7 +13,11 @@ use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
+use crate::sample::blind_spots::is_in_plane;
 use crate::sample::space::InputSpace;
+
+/// The number of samples with which leaving one out takes as long as all products.
+const LEFT_OUT: f64 = 3e3;
 
 /// Finds hyper-parameters in each of the spaces to choose from, follows those of the largest likelihood while
 /// neighbours and weights change with them, and conditions the process. The kernels measure the joint distance,
@@ -36,7 +41,7 @@ pub(crate) fn fit_process(problem: &Problem<'_>) -> Result<(Conditioned, FitRepo
         Some(basis) if problem.angles.len() > exact::MOST_SAMPLES => search_with_basis(problem, basis)?,
         _ => search(problem)?,
     };
-    let (gp, value) = state.condition(problem, &data)?;
+    let (gp, value) = state.condition(&problem.watch.part(left_out_share(problem), 1.0), &data)?;
     report.log_marginal_likelihood = value;
     Ok((Conditioned { gp, space, order: data.order().collect() }, report))
 }
@@ -49,9 +54,20 @@ struct Found {
     report: FitReport,
 }
 
+/// The share of a fit that is done before its process is conditioned.
+fn left_out_share(problem: &Problem<'_>) -> f64 {
+    let (searched, n) = (search_share(problem.angles.len()), problem.angles.len() as f64);
+    searched + (1.0 - searched) * LEFT_OUT / (LEFT_OUT + n)
+}
+
 /// Finds hyper-parameters in each of the spaces to choose from and follows those of the largest likelihood.
 fn search(problem: &Problem<'_>) -> Result<Found> {
-    let spaces = problem.space.map_or(InputSpace::ISOTROPIC.to_vec(), |space| vec![space]);
+    let in_plane = || problem.angles.iter().all(|angles| is_in_plane(*angles));
+    let spaces = match problem.space {
+        Some(space) => vec![space],
+        None if !problem.angles.is_empty() && in_plane() => vec![InputSpace::PlaneOfIncidence],
+        None => InputSpace::ISOTROPIC.to_vec(),
+    };
     let mut evaluations = 0;
     let mut best: Option<Search<'_>> = None;
     for space in spaces {
@@ -67,7 +83,8 @@ fn search(problem: &Problem<'_>) -> Result<Found> {
     evaluations -= best.evaluations;
     let space = best.space;
     let (data, state, mut report) = best.finish()?;
-    state.report_samples(&data, &mut report);
+    let searched = search_share(problem.angles.len());
+    state.report_samples(&data, &problem.watch.part(searched, left_out_share(problem)), &mut report)?;
     report.evaluations += evaluations;
     Ok(Found { data, state, space, report })
 }
@@ -116,7 +133,7 @@ pub(crate) fn condition_process(problem: &Problem<'_>, hyper: &Hyper) -> Result<
     let data = data(problem, space)?;
     let basis_variance = hyper.basis_variance.unwrap_or(1.0);
     let state = State::known(hyper.kernel.clone(), hyper.noise_variance, basis_variance, &data);
-    let (gp, value) = state.condition(problem, &data)?;
+    let (gp, value) = state.condition(problem.watch, &data)?;
     Ok((Conditioned { gp, space, order: data.order().collect() }, value))
 }
 

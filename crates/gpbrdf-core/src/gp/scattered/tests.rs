@@ -4,7 +4,8 @@ use super::neighbours::Embedded;
 use super::vecchia::{Targets, log_likelihood};
 use super::*;
 use crate::base::random::SplitMix64;
-use crate::gp::problem::{Observer, Outliers, Problem, Watch};
+use crate::base::watch::{Observer, Watch};
+use crate::gp::problem::{Outliers, Problem};
 use crate::gp::report::{FitReport, Noise};
 use crate::gp::{DenseEvaluator, DenseGp, OptimizeOptions};
 use crate::kernel::{AxisMetric, Shape, test_kernels};
@@ -60,7 +61,7 @@ fn with_all_earlier_samples_the_likelihood_is_the_exact_one() {
     let (points, y) = data(40, 0.1);
     let x = points.as_flattened();
     for kernel in test_kernels() {
-        let all = Embedded::new(x, &kernel).nearest_before(40);
+        let all = Embedded::new(x, &kernel).nearest_before(40, &Watch::default()).unwrap();
         let subset: Vec<u32> = (0..40).collect();
         let at = |kernel: &Kernel, noise: f64| {
             let noise = vec![noise; 40];
@@ -91,7 +92,7 @@ fn gradients_match_finite_differences_where_neighbours_are_few() {
         (shared, all)
     };
     for kernel in [kernel(), Kernel::ard(0.5, Shape::RationalQuadratic { alpha: 0.7 }, &[0.3, 0.5, 0.8])] {
-        let neighbours = Embedded::new(x, &kernel).nearest_before(7);
+        let neighbours = Embedded::new(x, &kernel).nearest_before(7, &Watch::default()).unwrap();
         let subset: Vec<u32> = (0..80).step_by(3).collect();
         let start: Vec<f64> = kernel.log_parameters().into_iter().chain([0.03f64.ln()]).collect();
         let at = |p: &[f64]| {
@@ -138,7 +139,7 @@ fn four_thousand_samples_agree_with_the_dense_process() {
             let data = Data::new(&points, &y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, _) = search.finish().unwrap();
-            state.condition(problem, &data).unwrap()
+            state.condition(problem.watch, &data).unwrap()
         });
         let (kernel, own) = (gp.kernel.clone(), gp.noise_variance);
         let dense = DenseGp::fit_at(points.as_flattened(), &rows(&y), CHANNELS, kernel, own).unwrap();
@@ -147,7 +148,8 @@ fn four_thousand_samples_agree_with_the_dense_process() {
         let at = crate::sample::random_directions(200, 0.97, 9);
         let test: Vec<f64> = at.iter().flat_map(|&a| space.coordinates(a)).collect();
         let (mean, expected) = (gp.mean_at(&test), dense.predict_mean(&test).unwrap());
-        let (variance, exact) = (gp.variance_at(&test, &[]), dense.predict_variance_latent(&test).unwrap());
+        let (variance, exact) =
+            (gp.variance_at(&test, &[]).unwrap(), dense.predict_variance_latent(&test).unwrap());
         let mut square = 0.0;
         for ((mean, expected), exact) in mean.chunks(CHANNELS).zip(expected.chunks(CHANNELS)).zip(&exact) {
             square += mean.iter().zip(expected).map(|(m, e)| (m - e).powi(2) / exact).sum::<f64>();
@@ -169,7 +171,7 @@ fn few_samples_are_left_out_exactly() {
     let dense = dense.unwrap();
     let mut report = FitReport::default();
     let data = Data::new(&points, &y, &[], None);
-    State::known(kernel(), 0.01, 0.0, &data).report_samples(&data, &mut report);
+    State::known(kernel(), 0.01, 0.0, &data).report_samples(&data, &Watch::default(), &mut report).unwrap();
     let found = report.leave_one_out.unwrap();
     for (a, b) in found.residuals.iter().zip(&dense.residuals) {
         assert!((a - b).abs() < 1e-7, "{a} {b}");
@@ -189,7 +191,7 @@ fn known_noise_counts_for_its_sample_only() {
         with_problem(y, Outliers::Keep, |problem| {
             let data = Data::new(points, y, known, None);
             let state = State::known(kernel(), 1e-4, 0.0, &data);
-            state.condition(problem, &data).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
+            state.condition(problem.watch, &data).unwrap().0.mean_at(&[0.3, 0.4, 0.5])
         })
     };
     let without =
@@ -215,8 +217,8 @@ fn outliers_are_found_and_nothing_else() {
             let data = Data::new(&points, &y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, mut report) = search.finish().unwrap();
-            state.report_samples(&data, &mut report);
-            let (gp, _) = state.condition(problem, &data).unwrap();
+            state.report_samples(&data, &Watch::default(), &mut report).unwrap();
+            let (gp, _) = state.condition(problem.watch, &data).unwrap();
             (gp.noise_variance.sqrt(), report)
         })
     };
@@ -238,7 +240,7 @@ fn the_order_of_samples_changes_no_bit() {
             let data = Data::new(points, y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, _) = search.finish().unwrap();
-            let (gp, value) = state.condition(problem, &data).unwrap();
+            let (gp, value) = state.condition(problem.watch, &data).unwrap();
             (gp.mean_at(&[0.1, 0.2, 0.3]), value, gp.kernel)
         })
     };

@@ -47,7 +47,7 @@ impl TableGeometry {
                 (theta_d.map(|t| t.powf(exponent)).collect(), limits.collect(), rows)
             }
             // v without a density says which cells are above the horizon.
-            InputSpace::PolarAngles | InputSpace::DifferenceAngle => {
+            InputSpace::PolarAngles | InputSpace::DifferenceAngle | InputSpace::PlaneOfIncidence => {
                 let limits = (0..N_THETA_H * COLUMNS).map(|k| {
                     let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
                     theta_d_max(center.theta_h, center.phi_d).recip()
@@ -65,7 +65,10 @@ impl TableGeometry {
                 let phi = (0..rows).map(|p| warped.warp_phi(cell_center(0, 0, p).phi_d));
                 (u.collect(), phi.collect())
             }
-            InputSpace::PolarAngles | InputSpace::DifferenceAngle | InputSpace::HalfDiff => (
+            InputSpace::PolarAngles
+            | InputSpace::DifferenceAngle
+            | InputSpace::PlaneOfIncidence
+            | InputSpace::HalfDiff => (
                 (0..N_THETA_H).map(|i| cell_center(i, 0, 0).theta_h).collect(),
                 (0..rows).map(|p| cell_center(0, 0, p).phi_d).collect(),
             ),

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::base::error::Result;
+use crate::base::watch::Watch;
 use crate::brdf::angles::HalfDiff;
 use crate::brdf::table::{
     N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, cell_center, cell_index, cell_indices, mirrored_column,
@@ -15,10 +16,26 @@ use crate::gp::table::{MeanTable, to_f32};
 /// `n^2` per point and varies slowly.
 const STEP: usize = 3;
 
+/// The number of means and of variances per thread that are predicted before somebody may stop the work: 0.1 s for
+/// 40,000 samples. Predictions do not depend on it.
+const MEANS: usize = 512;
+const VARIANCES: usize = 128;
+
+fn at_a_time(per_thread: usize) -> usize {
+    per_thread * rayon::current_num_threads()
+}
+
 /// Writes the predictive mean of every cell. In the warped box all cells of a column that are below the
 /// horizon have the same mean, and in a bilateral one both halves of `phi_d` do: this takes 0.56 million
 /// predictions instead of 1.46 million.
-pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanTable<'_>) {
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+pub(crate) fn bake_mean(
+    posterior: &(impl Posterior + ?Sized),
+    table: &mut MeanTable<'_>,
+    watch: &Watch,
+) -> Result<()> {
     let space = posterior.space();
     let columns = if space.is_bilateral() { N_PHI_D / 2 } else { N_PHI_D };
     let channels = posterior.n_channels();
@@ -38,7 +55,12 @@ pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanT
             }
         }
         starts.push(angles.len());
-        let means = posterior.predict_mean(&angles);
+        let mut means = Vec::with_capacity(angles.len() * channels);
+        for some in angles.chunks(at_a_time(MEANS)) {
+            let share = means.len() as f64 / (angles.len() * channels) as f64;
+            watch.reach((i as f64 + share) / N_THETA_H as f64)?;
+            means.extend(posterior.predict_mean(some));
+        }
         for p in 0..N_PHI_D {
             let column = if columns == N_PHI_D { p } else { mirrored_column(p) };
             let means = &means[starts[column] * channels..starts[column + 1] * channels];
@@ -52,12 +74,17 @@ pub(crate) fn bake_mean(posterior: &(impl Posterior + ?Sized), table: &mut MeanT
             }
         }
     }
+    Ok(())
 }
 
 /// Latent standard deviation of every cell, by trilinear interpolation between the middles of blocks of
 /// `STEP^3` cells: `30 x 30 x 60` points, or half as many in a bilateral space. Returns one plane per
 /// variance.
-pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Vec<f32>>> {
+///
+/// # Errors
+/// Those of [`Posterior::predict_variance`], and [`Error::Cancelled`](crate::Error::Cancelled) where the observer
+/// stops the work.
+pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized), watch: &Watch) -> Result<Vec<Vec<f32>>> {
     let bilateral = posterior.space().is_bilateral();
     let shape = [N_THETA_H / STEP, N_THETA_D / STEP, N_PHI_D / STEP / if bilateral { 2 } else { 1 }];
     let middle = |knot: usize| knot * STEP + STEP / 2;
@@ -67,7 +94,11 @@ pub(crate) fn bake_sigma(posterior: &(impl Posterior + ?Sized)) -> Result<Vec<Ve
             cell_center(middle(h), middle(d), middle(p))
         })
         .collect();
-    let variances = posterior.predict_variance(&knots)?;
+    let mut variances = Vec::with_capacity(knots.len() * posterior.n_variances());
+    for some in knots.chunks(at_a_time(VARIANCES)) {
+        watch.reach(variances.len() as f64 / (knots.len() * posterior.n_variances()) as f64)?;
+        variances.extend(posterior.predict_variance(some)?);
+    }
     let count = posterior.n_variances();
     let planes = (0..count).map(|variance| {
         let sigma: Vec<f64> = variances.iter().skip(variance).step_by(count).map(|v| v.sqrt()).collect();

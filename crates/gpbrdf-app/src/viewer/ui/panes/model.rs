@@ -5,10 +5,10 @@ use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Context, Key, KeyboardShortcut, Modifiers, RichText, Ui};
 use gpbrdf_core::judge::{LeftOut, Outlier};
-use gpbrdf_core::{LatticeLayout, MeanFunction, Shape, Symmetry};
+use gpbrdf_core::{LatticeLayout, MeanFunction, Progress, Shape, Symmetry};
 
 use crate::job::{
-    Kernels, LayoutChoice, ModelSpec, NoiseChoice, SymmetryChoice, TransformChoice, hyper_sliders,
+    Kernels, LayoutChoice, ModelSpec, NoiseChoice, SymmetryChoice, TransformChoice, hyper_sliders, remaining,
 };
 use crate::viewer::state::document::{Document, Work};
 use crate::viewer::ui::pane::{Command, Offers, Order, Pane, PaneContext, Place, Start};
@@ -261,11 +261,11 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
             click = Some(Click::Cancel);
         }
         match &document.work {
-            Work::Running { stage, since, evaluations } => {
+            Work::Running { stage, since, progress, .. } => {
                 ui.spinner();
                 let seconds = since.elapsed().as_secs_f64();
-                let text = if *evaluations > 0 {
-                    format!("{} ({evaluations})", stage.label())
+                let text = if progress.evaluations > 0 {
+                    format!("{} ({})", stage.label(), progress.evaluations)
                 } else {
                     stage.label().to_owned()
                 };
@@ -287,6 +287,13 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
             }
         }
     });
+    // What is over at once needs no bar.
+    if let Work::Running { begun, progress: Progress { share: Some(share), .. }, .. } = document.work
+        && let Some(left) = remaining(begun.elapsed(), share)
+    {
+        #[expect(clippy::cast_possible_truncation, reason = "it becomes a number of pixels")]
+        ui.add(egui::ProgressBar::new(share as f32).text(format!("{:.0} %, {left}", 100.0 * share)));
+    }
     click
 }
 
