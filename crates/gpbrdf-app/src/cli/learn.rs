@@ -71,8 +71,9 @@ impl Learn {
         let (weights, others): (Vec<_>, Vec<_>) = self.inputs.iter().partition(|path| is_neural_csv(path));
         for path in weights {
             let fits = terminal.stage("Loading", || anyhow::Ok(read_neural_csv(path)?))?;
-            let fits = fits.iter().filter(|(name, _)| !is_left_out(name));
-            fits.for_each(|(name, network)| library.add(name, network));
+            for (name, network) in fits.iter().filter(|(name, _)| !is_left_out(name)) {
+                terminal.stage("Learning", || library.add(name, network))?;
+            }
         }
         for path in others {
             let source = terminal.stage("Loading", || open(path, self.reading, terminal))?;
@@ -83,9 +84,9 @@ impl Learn {
                 Content::Samples(samples) => {
                     let fitted =
                         terminal.stage("Fitting", || anyhow::Ok(fit(samples, &FitOptions::default())?))?;
-                    library.add(&source.name, &fitted.model);
+                    library.add(&source.name, &fitted.model)?;
                 }
-                _ => library.add(&source.name, source.brdf()?),
+                _ => terminal.stage("Learning", || anyhow::Ok(library.add(&source.name, source.brdf()?)?))?,
             }
         }
         Ok(library)

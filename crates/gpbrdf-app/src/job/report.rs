@@ -95,6 +95,7 @@ impl Report {
         if !self.at_bound.is_empty() {
             lines.push(format!("  at a bound of its range: {}", self.at_bound.join(", ")));
         }
+        lines.extend(self.prior_line());
         if let Some(left_out) = &self.leave_one_out {
             lines.extend(left_out_lines(left_out));
         }
@@ -109,6 +110,20 @@ impl Report {
             lines.push(format!("  wrote {output}"));
         }
         lines.join("\n")
+    }
+}
+
+impl Report {
+    /// Which prior was used, and how much of the prediction it explains.
+    fn prior_line(&self) -> Option<String> {
+        let of = &self.hyperparameters;
+        let (name, share) = (of.get("prior")?.as_str()?, of.get("share_of_prior")?.as_f64()?);
+        let materials = of.get("prior_materials")?.as_u64()?;
+        Some(format!(
+            "  prior \"{name}\", learned from {materials} materials: {:.0} % of the variance of the prediction \
+             (--prior none does without)",
+            100.0 * share
+        ))
     }
 }
 

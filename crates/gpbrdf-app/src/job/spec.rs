@@ -134,6 +134,7 @@ impl ModelSpec {
     /// # Errors
     /// The first contradiction.
     pub(crate) fn check(&self, source: &Source) -> Result<()> {
+        self.check_prior()?;
         if self.compression.size().is_some() {
             return Ok(());
         }
@@ -163,6 +164,25 @@ impl ModelSpec {
             );
         }
         Ok(())
+    }
+
+    /// Refuses a prior of the user's own where the other options leave no use for it.
+    fn check_prior(&self) -> Result<()> {
+        let PriorName::File(path) = &self.prior else { return Ok(()) };
+        let contradictions = [
+            ("--transform log --epsilon 0.001", self.transform() == Transform::default()),
+            ("--mean constant", self.mean == MeanFunction::Constant),
+            ("no --per-channel", !self.per_channel),
+            ("no --no-hyper-priors", !self.no_hyper_priors),
+            ("no --node-density", self.node_density.is_none()),
+            ("no symmetry but bilateral", self.symmetry != SymmetryChoice::Reciprocal),
+            ("--solver auto or scattered", matches!(self.solver, Solver::Auto | Solver::Scattered)),
+            ("no compression", self.compression.size().is_none()),
+        ];
+        match contradictions.iter().find(|(_, holds)| !holds) {
+            Some((expected, _)) => bail!("--prior {}: expected {expected}, found otherwise", path.display()),
+            None => Ok(()),
+        }
     }
 
     /// Number of samples of a source that can be evaluated at any direction, off a lattice.

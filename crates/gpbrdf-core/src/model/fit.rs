@@ -12,9 +12,13 @@ use crate::model::Model;
 use crate::prior::Prior;
 use crate::sample::{InputSpace, MeanFunction, SampleSet, Symmetry, Transform};
 
-/// The largest number of samples off a lattice, and of nodes of a lattice, for which a learned prior is used.
-const MOST_SAMPLES_WITH_PRIOR: usize = 20_000;
-const FEW_NODES: usize = 400;
+/// The largest number of samples for which a learned prior is used. Random directions hardly ever come near the mirror
+/// direction: 40 of them give better materials with a prior, 300 do not (`docs/results.md`).
+const FEW_SAMPLES: usize = 250;
+
+/// The largest number of samples in the plane of incidence for which it is used: they say nothing of all other
+/// directions.
+const MANY_SAMPLES: usize = 20_000;
 
 /// What is known of other materials.
 #[derive(Clone, Debug, Default)]
@@ -89,16 +93,21 @@ impl FitOptions {
     }
 
     /// The prior that a fit to these samples uses, if any: that of the options for targets that it describes, channels
-    /// that share hyper-parameters with weak priors, isotropic bilateral materials, and a solver that is not that of
-    /// another kind of samples. With [`Solver::Auto`] samples on a lattice use it where they are few.
+    /// that share hyper-parameters with weak priors, and isotropic bilateral materials. With [`Solver::Auto`] it is used
+    /// for at most 250 samples, and for at most 20,000 in the plane of incidence or with a prior of the user's own; with
+    /// [`Solver::Scattered`] for any number; with other solvers never.
     #[must_use]
     pub fn prior(&self, samples: &SampleSet) -> Option<Arc<Prior>> {
+        let n = samples.len();
+        let are_few = match &self.prior {
+            PriorChoice::None => return None,
+            PriorChoice::BuiltIn => n <= FEW_SAMPLES || samples.is_in_plane() && n <= MANY_SAMPLES,
+            PriorChoice::Learned(_) => n <= MANY_SAMPLES,
+        };
         let by_solver = match (self.solver, samples.lattice()) {
             (Solver::Scattered, _) => true,
-            (Solver::Auto, None) => samples.len() <= MOST_SAMPLES_WITH_PRIOR,
-            (Solver::Auto, Some(lattice)) => {
-                samples.len() <= FEW_NODES && lattice.symmetry == Symmetry::Bilateral
-            }
+            (Solver::Auto, None) => are_few,
+            (Solver::Auto, Some(lattice)) => n <= FEW_SAMPLES && lattice.symmetry == Symmetry::Bilateral,
             _ => false,
         };
         let is_described = self.transform == Prior::TRANSFORM

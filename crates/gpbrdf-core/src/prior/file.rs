@@ -12,7 +12,7 @@ use crate::gp::table::to_f32;
 use crate::gp::{TensorReader, TensorWriter};
 
 /// The prior that comes with the crate.
-const BUILT_IN: &[u8] = include_bytes!("../../assets/prior.safetensors");
+pub(super) const BUILT_IN: &[u8] = include_bytes!("../../assets/prior.safetensors");
 
 /// The key of the description in the file's metadata.
 const KEY: &str = "gpbrdf_prior";

@@ -7,7 +7,7 @@ use crate::brdf::materials;
 fn library() -> Library {
     let mut library = Library::new(300).unwrap();
     for material in materials() {
-        library.add(material.name, &material.brdf);
+        library.add(material.name, &material.brdf).unwrap();
     }
     library
 }
@@ -84,4 +84,31 @@ fn the_built_in_prior_is_small_and_whole() {
         prior.materials.len()
     );
     assert!(prior.left(Colour::Achromatic) < 1.0 && prior.left(Colour::Chromatic) < 1.0);
+    assert!(file::BUILT_IN.len() <= 1 << 20, "{}", file::BUILT_IN.len());
+    #[cfg(feature = "formats")]
+    assert_eq!(crate::formats::sha256_hex(file::BUILT_IN), Prior::BUILT_IN_SHA256);
+}
+
+/// Weights on one half of the library: the prior moves towards it, and equal weights leave its mean where it is.
+#[cfg(feature = "fit")]
+#[test]
+fn adapted_priors_resemble_the_materials_with_large_weights() {
+    let all = library();
+    let prior = learn("test", &all, &LearnOptions { functions: [100, 100] }).unwrap();
+    let count = prior.materials.len();
+    let equal = prior.adapted(&vec![0.2; count]).unwrap();
+    let place = prior.materials.iter().position(|name| name == "red-plastic").unwrap();
+    let mut weights = vec![1e-3; count];
+    weights[place] = 1.0;
+    let near = prior.adapted(&weights).unwrap();
+    let truth = all.brightness_of("red-plastic");
+    let error = |prior: &Prior| {
+        let mean = prior.mean(Colour::Achromatic, all.centres());
+        mean.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    };
+    assert!((error(&equal) / error(&prior) - 1.0).abs() < 1e-3, "{} {}", error(&equal), error(&prior));
+    assert!(error(&near) < 0.2 * error(&prior), "{} {}", error(&near), error(&prior));
+    for bad in [vec![1.0; count - 1], vec![0.0; count], vec![-1.0; count]] {
+        assert!(prior.adapted(&bad).is_err());
+    }
 }

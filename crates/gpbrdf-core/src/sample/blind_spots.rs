@@ -19,6 +19,12 @@ const GRAZING: f64 = 60.0;
 const ONE_INCIDENCE: f64 = 0.5;
 
 impl SampleSet {
+    /// Whether there are samples, and all of them lie in the plane of incidence to within a degree.
+    #[must_use]
+    pub fn is_in_plane(&self) -> bool {
+        !self.is_empty() && self.angles.iter().all(|angles| is_in_plane(*angles))
+    }
+
     /// What the directions of the samples leave open, in sentences for users without a full stop. A model
     /// predicts there all the same, from the rest and from its prior.
     #[must_use]
@@ -27,7 +33,7 @@ impl SampleSet {
         if self.is_empty() {
             return found;
         }
-        if self.angles.iter().all(|angles| is_in_plane(*angles)) {
+        if self.is_in_plane() {
             found.push(
                 "all samples lie in the plane of incidence: values outside of it are extrapolated".to_owned(),
             );

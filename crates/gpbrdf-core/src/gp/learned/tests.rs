@@ -10,7 +10,7 @@ use std::sync::Arc;
 fn prior(left_out: &str) -> Arc<Prior> {
     let mut library = Library::new(200).unwrap();
     for material in materials().iter().filter(|m| m.name != left_out) {
-        library.add(material.name, &material.brdf);
+        library.add(material.name, &material.brdf).unwrap();
     }
     Arc::new(learn("test", &library, &LearnOptions { functions: [8, 5] }).unwrap())
 }

@@ -62,10 +62,11 @@ fn left_out_share(problem: &Problem<'_>) -> f64 {
 
 /// Finds hyper-parameters in each of the spaces to choose from and follows those of the largest likelihood.
 fn search(problem: &Problem<'_>) -> Result<Found> {
+    // What a basis leaves of samples in the plane of incidence is best taken out of it as it is.
     let in_plane = || problem.angles.iter().all(|angles| is_in_plane(*angles));
     let spaces = match problem.space {
         Some(space) => vec![space],
-        None if !problem.angles.is_empty() && in_plane() => vec![InputSpace::PlaneOfIncidence],
+        None if problem.basis.is_some() && in_plane() => vec![InputSpace::PlaneOfIncidence],
         None => InputSpace::ISOTROPIC.to_vec(),
     };
     let mut evaluations = 0;
@@ -110,8 +111,10 @@ fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Foun
     let coefficients = few.state.basis_coefficients(&few.data)?;
     let left =
         |(y, z): (&Vec<f64>, &Vec<f64>)| y.iter().enumerate().map(|(i, y)| y - dot(row(i), z)).collect();
+    let in_plane = few.space == InputSpace::PlaneOfIncidence;
     let rest = search(&Problem {
         targets: problem.targets.iter().zip(&coefficients).map(left).collect(),
+        space: if in_plane { Some(few.space) } else { problem.space },
         basis: None,
         ..problem.clone()
     })?;

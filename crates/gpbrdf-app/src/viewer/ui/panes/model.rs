@@ -8,7 +8,8 @@ use gpbrdf_core::judge::{LeftOut, Outlier};
 use gpbrdf_core::{LatticeLayout, MeanFunction, Progress, Shape, Symmetry};
 
 use crate::job::{
-    Kernels, LayoutChoice, ModelSpec, NoiseChoice, SymmetryChoice, TransformChoice, hyper_sliders, remaining,
+    Kernels, LayoutChoice, ModelSpec, NoiseChoice, PriorName, SymmetryChoice, TransformChoice, hyper_sliders,
+    remaining,
 };
 use crate::viewer::state::document::{Document, Work};
 use crate::viewer::ui::pane::{Command, Offers, Order, Pane, PaneContext, Place, Start};
@@ -203,6 +204,14 @@ fn process_ui(ui: &mut Ui, document: &mut Document) {
     let means = [MeanFunction::Constant, MeanFunction::Zero];
     let mean_name = |m| if m == MeanFunction::Zero { "Zero" } else { "Average of the samples" };
     choice_ui(ui, "Prior mean", &mut spec.mean, &means, mean_name);
+    let mut learned = spec.prior != PriorName::None;
+    row_ui(ui, "Other materials", |ui| {
+        let help = "Use what other materials have in common, where samples are few or lie in one plane";
+        ui.checkbox(&mut learned, "Prior").on_hover_text(help);
+    });
+    if learned != (spec.prior != PriorName::None) {
+        spec.prior = if learned { PriorName::BuiltIn } else { PriorName::None };
+    }
     let mut fixed = spec.noise.0.is_some();
     row_ui(ui, "Noise", |ui| {
         ui.checkbox(&mut fixed, "Fixed").on_hover_text("Hold the noise variance while optimising");
