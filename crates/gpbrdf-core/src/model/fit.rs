@@ -93,9 +93,9 @@ impl FitOptions {
     }
 
     /// The prior that a fit to these samples uses, if any: that of the options for targets that it describes, channels
-    /// that share hyper-parameters with weak priors, and isotropic bilateral materials. With [`Solver::Auto`] it is used
-    /// for at most 250 samples, and for at most 20,000 in the plane of incidence or with a prior of the user's own; with
-    /// [`Solver::Scattered`] for any number; with other solvers never.
+    /// that share hyper-parameters with weak priors, and isotropic bilateral materials. With [`Solver::Auto`] it is
+    /// used for at most 250 samples, and for at most 20,000 in the plane of incidence or with a prior of the user's
+    /// own; with [`Solver::Scattered`] for any number; with other solvers never.
     #[must_use]
     pub fn prior(&self, samples: &SampleSet) -> Option<Arc<Prior>> {
         let n = samples.len();

@@ -87,7 +87,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "0";
+    pub const BUILT_IN_SHA256: &str = "b28f7ce18bdfd6bc0080fb62a5c2d4fdf9a7b26bd1315ad09f6b95a3fd2c7f0d";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]

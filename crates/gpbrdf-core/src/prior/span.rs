@@ -25,8 +25,8 @@ const BLOCK: usize = 64;
 /// The fewest and the most centres.
 const CENTRES: std::ops::RangeInclusive<usize> = 10..=20_000;
 
-/// All functions `c_0 + sum_j c_j k(x, x_j)` with a Matern 5/2 kernel `k` of [`InputSpace::PolarAngles`] and centres `x_j`
-/// that are spread evenly over the warped box. They are smooth, isotropic, reciprocal and bilateral.
+/// All functions `c_0 + sum_j c_j k(x, x_j)` with a Matern 5/2 kernel `k` of [`InputSpace::PolarAngles`] and centres
+/// `x_j` that are spread evenly over the warped box. They are smooth, isotropic, reciprocal and bilateral.
 #[derive(Clone, Debug)]
 pub(crate) struct Span {
     centres: Vec<HalfDiff>,
@@ -37,8 +37,8 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// The functions of `count` centres: point `i` of an additive recurrence in the warped box. Source: M. Roberts, "The
-    /// Unreasonable Effectiveness of Quasirandom Sequences" (2018), in three dimensions.
+    /// The functions of `count` centres: point `i` of an additive recurrence in the warped box. Source: M. Roberts,
+    /// "The Unreasonable Effectiveness of Quasirandom Sequences" (2018), in three dimensions.
     ///
     /// # Errors
     /// Fewer than 10 centres, or more than 20,000.

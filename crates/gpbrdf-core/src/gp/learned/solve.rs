@@ -27,8 +27,8 @@ const MOST_COMPARED: usize = 512;
 /// Finds hyper-parameters of both kinds of colour and conditions their processes. The targets are those of three
 /// channels, whose prior mean is the prior's own.
 ///
-/// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those that
-/// the samples resemble.
+/// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
+/// that the samples resemble.
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     let fit_colour = |prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
@@ -45,9 +45,9 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     Ok((posterior, combined(&[bright_report, coloured_report])))
 }
 
-/// How much the samples resemble each material of the library, as weights with a sum of 1: the likelihood of the samples
-/// if the material were that one but for its brightness, noise and the rest that the kernel describes, to a power of at
-/// most 1 at which no fewer than 20 materials count.
+/// How much the samples resemble each material of the library, as weights with a sum of 1: the likelihood of the
+/// samples if the material were that one but for its brightness, noise and the rest that the kernel describes, to a
+/// power of at most 1 at which no fewer than 20 materials count.
 fn library_weights(problem: &Problem<'_>, prior: &Prior, found: &Conditioned) -> Result<Vec<f64>> {
     let some: Vec<usize> = found.order.iter().copied().take(MOST_COMPARED).collect();
     let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();

@@ -43,7 +43,8 @@ const NEAREST: usize = 48;
 /// A Gaussian process conditioned on scattered samples. The channels share kernel and noise.
 ///
 /// The covariance is `k(x, x') + v b(x)^T b(x')`, where `b` may be empty. The mean is that of the exact process,
-/// `sum_i alpha_i k(x, x_i) + v b(x)^T sum_i alpha_i b(x_i)` with weights from conjugate gradients. The variance is that given the 48 nearest samples and, through 200 inducing points, all others.
+/// `sum_i alpha_i k(x, x_i) + v b(x)^T sum_i alpha_i b(x_i)` with weights from conjugate gradients. The variance is
+/// that given the 48 nearest samples and, through 200 inducing points, all others.
 #[derive(Clone, Debug)]
 pub(crate) struct ScatteredGp {
     kernel: Kernel,

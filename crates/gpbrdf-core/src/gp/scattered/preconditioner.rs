@@ -2,9 +2,10 @@
 //! what is left by nearest neighbours.
 //!
 //! The covariance is split as `K = B B^T + R`, where `B B^T` is the part that a basis spans, and what the first
-//! samples of the order know of all others (Nystrom). The inverse of the rest `R`, noise included, is a sparse product `U U^T` from conditionals
-//! on nearest neighbours, and the inverse of the sum follows from Woodbury's formula. Source: T. Gyger, R.
-//! Furrer and F. Sigrist, "Vecchia-Inducing-Points Full-Scale Approximations for Gaussian Processes" (2025).
+//! samples of the order know of all others (Nystrom). The inverse of the rest `R`, noise included, is a sparse
+//! product `U U^T` from conditionals on nearest neighbours, and the inverse of the sum follows from Woodbury's
+//! formula. Source: T. Gyger, R. Furrer and F. Sigrist, "Vecchia-Inducing-Points Full-Scale Approximations for
+//! Gaussian Processes" (2025).
 
 use rayon::prelude::*;
 
@@ -121,8 +122,8 @@ pub(super) struct FarField {
 
 impl FarField {
     /// Variance of the noise-free function at a point with these values of the basis, given its nearest samples and,
-    /// through basis and inducing points, all others: `v + c^T S^-1 c` with `c = b(x) - sum_i beta_i b_i`, where `beta` and `v` are coefficients and
-    /// variance of the rest given the rests of the nearest samples.
+    /// through basis and inducing points, all others: `v + c^T S^-1 c` with `c = b(x) - sum_i beta_i b_i`, where
+    /// `beta` and `v` are coefficients and variance of the rest given the rests of the nearest samples.
     pub(super) fn variance(
         &self,
         process: &Process<'_>,

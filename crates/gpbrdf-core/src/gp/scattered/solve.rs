@@ -91,8 +91,8 @@ fn search(problem: &Problem<'_>) -> Result<Found> {
 }
 
 /// Like [`search`] for many samples with a basis, which correlates all of them, so that neighbours do not tell its
-/// coefficients: these and the variance of the basis come from 512 samples, space, kernel and noise from what they leave
-/// of all samples.
+/// coefficients: these and the variance of the basis come from 512 samples, space, kernel and noise from what they
+/// leave of all samples.
 fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Found> {
     let first = problem.space.unwrap_or(InputSpace::ISOTROPIC[0]);
     let some: Vec<usize> = data(problem, first)?.order().take(exact::MOST_SAMPLES).collect();
