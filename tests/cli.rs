@@ -13,6 +13,7 @@ mod cli {
     mod instruments;
     mod measured;
     mod odd_input;
+    mod plan;
     mod process;
     mod render;
     mod reproduce;

@@ -35,6 +35,7 @@
 //! - [`model`]: [`fit`](fit()) finds hyper-parameters by maximum marginal likelihood. A [`Model`] predicts
 //!   means and intervals, implements [`Brdf`], and is saved and loaded bit for bit. [`Baked`] holds its
 //!   values in all 1,458,000 cells of a table.
+//! - [`prior`]: what other materials tell. `plan` (with the feature `fit`): what to measure next.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
 //! All features are on by default. Without them a program that loads, evaluates and bakes models builds a tree of
@@ -60,6 +61,8 @@ pub mod gp;
 pub mod judge;
 pub mod kernel;
 pub mod model;
+#[cfg(feature = "fit")]
+pub mod plan;
 pub mod prior;
 pub mod sample;
 #[cfg(test)]

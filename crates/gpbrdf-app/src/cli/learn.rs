@@ -6,11 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::formats::{is_neural_csv, read_neural_csv};
 use gpbrdf_core::prior::{Colour, LearnOptions, Library, learn};
-use gpbrdf_core::{Content, FitOptions, fit};
 
-use super::input::open;
+use super::library::read_materials;
 use super::reading::Reading;
 use super::terminal::Terminal;
 
@@ -68,27 +66,9 @@ impl Learn {
     fn library(&self, terminal: &Terminal) -> Result<Library> {
         let mut library = Library::new(self.centres)?;
         let is_left_out = |name: &str| self.leave_out.iter().any(|word| name.starts_with(word.as_str()));
-        let (weights, others): (Vec<_>, Vec<_>) = self.inputs.iter().partition(|path| is_neural_csv(path));
-        for path in weights {
-            let fits = terminal.stage("Loading", || anyhow::Ok(read_neural_csv(path)?))?;
-            for (name, network) in fits.iter().filter(|(name, _)| !is_left_out(name)) {
-                terminal.stage("Learning", || library.add(name, network))?;
-            }
-        }
-        for path in others {
-            let source = terminal.stage("Loading", || open(path, self.reading, terminal))?;
-            if is_left_out(&source.name) {
-                continue;
-            }
-            match &source.content {
-                Content::Samples(samples) => {
-                    let fitted =
-                        terminal.stage("Fitting", || anyhow::Ok(fit(samples, &FitOptions::default())?))?;
-                    library.add(&source.name, &fitted.model)?;
-                }
-                _ => terminal.stage("Learning", || anyhow::Ok(library.add(&source.name, source.brdf()?)?))?,
-            }
-        }
+        read_materials(&self.inputs, self.reading, is_left_out, terminal, |name, brdf| {
+            terminal.stage("Learning", || Ok(library.add(name, brdf)?))
+        })?;
         Ok(library)
     }
 }

@@ -7,8 +7,10 @@ mod fit;
 mod info;
 mod input;
 mod learn;
+mod library;
 mod materials;
 mod parse;
+mod plan;
 mod predict;
 mod reading;
 mod render;
@@ -51,6 +53,8 @@ enum Command {
     Fit(fit::Fit),
     /// What an instrument would measure: scattered samples with noise and outliers, as a CSV file.
     Sample(sample::Sample),
+    /// Which directions to measure next, as a CSV file.
+    Plan(Box<plan::Plan>),
     /// Values with 95 % intervals at the directions of a CSV file.
     Predict(predict::Predict),
     /// Compare a prediction with a truth.
@@ -94,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Bake(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
         Command::Sample(command) => command.run(&terminal),
+        Command::Plan(command) => command.run(&terminal),
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),

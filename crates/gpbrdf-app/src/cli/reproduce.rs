@@ -11,10 +11,12 @@ use gpbrdf_core::formats::{read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
 use super::input::environment;
+use super::library::read_materials;
+use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::Observer;
 use crate::output::OutputFolder;
-use crate::reproduce::{Context, Experiment, PAPER_MATERIALS, measurements, store};
+use crate::reproduce::{Context, Experiment, Materials, PAPER_MATERIALS, measurements, store};
 
 #[derive(Args, Debug)]
 pub(crate) struct Reproduce {
@@ -33,6 +35,10 @@ pub(crate) struct Reproduce {
     /// CSV file with the weights of Neural BRDF fits to compare with, 675 per material.
     #[arg(long, value_name = "FILE")]
     nbrdf: Option<PathBuf>,
+    /// Materials to learn priors from, as for `gpbrdf-cli learn`, for the experiment prior. The measurements of --data
+    /// are added to them.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    library: Vec<PathBuf>,
     /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
@@ -63,6 +69,7 @@ impl Reproduce {
                 );
             }
         }
+        let library = self.library(&measured, terminal)?;
         let context = Context {
             quick: self.quick,
             budget,
@@ -71,9 +78,13 @@ impl Reproduce {
             neural: self.nbrdf.as_deref().map_or(Ok(Vec::new()), read_neural_csv)?,
             built_in: PAPER_MATERIALS.into_iter().map(Source::built_in).collect::<Result<_, _>>()?,
             measured,
+            library,
         };
         let key = self.key(&context)?;
-        let chosen = |e: &Experiment| self.only.is_empty() || self.only.contains(e);
+        let chosen = |e: &Experiment| match self.only[..] {
+            [] => e.is_possible(&context),
+            _ => self.only.contains(e),
+        };
         let (done, open): (Vec<_>, Vec<_>) = Experiment::ALL
             .into_iter()
             .filter(chosen)
@@ -106,6 +117,26 @@ impl Reproduce {
         Ok(())
     }
 
+    /// The materials of `--library` and the measurements.
+    fn library(&self, measured: &[Source], terminal: &Terminal) -> Result<Option<Materials>> {
+        if self.library.is_empty() {
+            return Ok(None);
+        }
+        let mut materials = Materials::new()?;
+        let reading = Reading::default();
+        read_materials(
+            &self.library,
+            reading,
+            |_| false,
+            terminal,
+            |name, brdf| terminal.stage("Learning", || materials.add(name, brdf)),
+        )?;
+        for source in measured {
+            terminal.stage("Learning", || materials.add(&source.name, source.brdf()?))?;
+        }
+        Ok(Some(materials))
+    }
+
     /// What the results depend on: the options and the checksums of the inputs.
     fn key(&self, context: &Context) -> Result<Value> {
         let sum = |file: &Option<PathBuf>| file.as_ref().map(sha256_file).transpose();
@@ -117,6 +148,7 @@ impl Reproduce {
             "materials": self.materials,
             "measurements": measured,
             "nbrdf": sum(&self.nbrdf)?,
+            "library": self.library.iter().map(sha256_file).collect::<Result<Vec<_>, _>>()?,
             "env": sum(&self.env)?,
         }))
     }

@@ -9,11 +9,12 @@ use gpbrdf_core::brdf::analytic::NeuralBrdf;
 use gpbrdf_core::figure::Picture;
 use gpbrdf_core::formats::{merl_material_name, sha256_file};
 use gpbrdf_core::{
-    BrdfTable, Content, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet, Source,
-    Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
+    Brdf, BrdfTable, Content, Environment, FitOptions, LatticeLayout, Layout, Metrics, Model, SampleSet,
+    Source, Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
 use super::plot::{Axis, Curve, curves};
+use super::prior::Materials;
 use super::table::Table;
 use crate::job::{Observer, judge, samples_within};
 
@@ -74,6 +75,8 @@ pub(crate) struct Context {
     /// The only materials to use; all if empty.
     pub(crate) only: Vec<String>,
     pub(crate) neural: Vec<(String, NeuralBrdf)>,
+    /// The materials of `--library` and, where it is given, the measurements.
+    pub(crate) library: Option<Materials>,
 }
 
 /// A material of an experiment.
@@ -95,6 +98,14 @@ impl<'a> Material<'a> {
     /// If the source is scattered samples.
     pub(super) fn truth(&self) -> Result<Cow<'a, BrdfTable>> {
         Ok(self.source.table()?)
+    }
+
+    /// The source as a function of directions.
+    ///
+    /// # Errors
+    /// If the source is scattered samples.
+    pub(super) fn brdf(&self) -> Result<&'a dyn Brdf> {
+        Ok(self.source.brdf()?)
     }
 
     /// Measures the source on the default lattice of about `count` nodes.
@@ -173,6 +184,13 @@ impl Context {
             found.truncate(3);
         }
         Ok(found)
+    }
+
+    /// The RGL measurements of `--data`.
+    pub(super) fn rgl_materials(&self) -> Vec<Material<'_>> {
+        let rgl =
+            self.measured.iter().filter(|source| source.kind.contains("RGL") && self.wanted(&source.name));
+        rgl.map(|source| Material { source, origin: &source.kind }).collect()
     }
 
     /// The largest number of samples whose dense fit with `terms` kernels keeps to the budget of time.

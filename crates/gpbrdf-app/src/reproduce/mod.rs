@@ -10,7 +10,10 @@ mod measures;
 mod paper_lattice;
 mod pictures;
 mod plot;
+mod principal;
+mod prior;
 mod sampling;
+mod simulate;
 pub(crate) mod store;
 mod table;
 
@@ -19,6 +22,8 @@ use clap::ValueEnum;
 
 use context::Outcome;
 pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
+pub(crate) use prior::Materials;
+pub(crate) use simulate::{BATCHES, Simulation, Trial};
 
 /// Seconds for a fit on a lattice, its table, pictures and metrics.
 const LATTICE: f64 = 4.0;
@@ -38,11 +43,20 @@ pub(crate) enum Experiment {
     Figures345,
     /// Neural BRDF, sampling curve, calibration.
     Beyond,
+    /// Few measurements with a learned prior; needs --library and --data.
+    Prior,
 }
 
 impl Experiment {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Table1, Self::Figure2, Self::Table2, Self::Table3, Self::Figures345, Self::Beyond];
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Table1,
+        Self::Figure2,
+        Self::Table2,
+        Self::Table3,
+        Self::Figures345,
+        Self::Beyond,
+        Self::Prior,
+    ];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -52,6 +66,7 @@ impl Experiment {
             Self::Table3 => "table3",
             Self::Figures345 => "figures345",
             Self::Beyond => "beyond",
+            Self::Prior => "prior",
         }
     }
 
@@ -63,7 +78,13 @@ impl Experiment {
             Self::Table3 => kernels::run(context),
             Self::Figures345 => pictures::run(context),
             Self::Beyond => beyond::run(context),
+            Self::Prior => prior::run(context),
         }
+    }
+
+    /// Whether the experiment has what it needs. One that has not is left out, unless it was asked for.
+    pub(crate) fn is_possible(self, context: &Context) -> bool {
+        self != Self::Prior || prior::is_possible(context)
     }
 
     /// The expected time in seconds, right within a factor of three on a machine with two cores. A dense fit
@@ -100,6 +121,7 @@ impl Experiment {
                     all * 10.0 * LATTICE
                 }
             }
+            Self::Prior => prior::seconds(context),
         }
     }
 }

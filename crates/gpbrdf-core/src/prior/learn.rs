@@ -8,7 +8,8 @@ use super::{Functions, Prior};
 use crate::base::error::{Error, Result};
 use crate::base::linalg::{factorize, product, solve, symmetric_eigen, view_slice};
 use crate::base::simd::{add_scaled, dot};
-use crate::brdf::Brdf;
+use crate::brdf::angles::HalfDiff;
+use crate::brdf::{Brdf, Rgb};
 use crate::gp::{Outliers, Solver};
 use crate::model::{FitOptions, PriorChoice, fit};
 use crate::sample::{Layout, SampleSet};
@@ -102,14 +103,27 @@ impl Library {
             ..FitOptions::default()
         };
         let model = fit(&samples, &options)?.model;
-        self.add_values(name, &model.predict_target(self.span.centres()));
-        Ok(())
+        self.add_values(name, &model.predict_mean(self.centres()))
     }
 
-    /// Adds a material by the logarithms of its channels at the centres.
-    fn add_values(&mut self, name: &str, logarithms: &[[f64; 3]]) {
+    /// The directions at which materials are known.
+    #[must_use]
+    pub fn centres(&self) -> &[HalfDiff] {
+        self.span.centres()
+    }
+
+    /// Adds a material by its values at [`Library::centres`], sr^-1, as they are. One of the same name is replaced.
+    ///
+    /// # Errors
+    /// A number of values that is not that of the centres, or values that are not finite.
+    pub fn add_values(&mut self, name: &str, values: &[Rgb]) -> Result<()> {
         let n = self.span.len();
-        let values: Vec<[f64; 3]> = logarithms.iter().map(|&channels| to_opponent(channels)).collect();
+        if values.len() != n || values.as_flattened().iter().any(|f| !f.is_finite()) {
+            let expected = format!("{n} finite ones for {name}");
+            return Err(Error::argument("values of a material", expected, values.len()));
+        }
+        let target = |f: f64| Prior::TRANSFORM.forward(f.clamp(0.0, BRIGHTEST));
+        let values: Vec<[f64; 3]> = values.iter().map(|&rgb| to_opponent(rgb.map(target))).collect();
         let columns: [Vec<f64>; 3] = std::array::from_fn(|c| values.iter().map(|v| v[c]).collect());
         let colours = columns.map(|mut column| {
             let constant = column.iter().sum::<f64>() / n as f64;
@@ -128,6 +142,7 @@ impl Library {
                 self.colours.push(colours);
             }
         }
+        Ok(())
     }
 
     /// The names of the materials.
@@ -283,9 +298,5 @@ impl Library {
     pub(super) fn brightness_of(&self, name: &str) -> Vec<f64> {
         let place = self.names.iter().position(|known| known == name);
         place.map_or_else(Vec::new, |place| self.colours[place][0].values.clone())
-    }
-
-    pub(super) fn centres(&self) -> &[crate::HalfDiff] {
-        self.span.centres()
     }
 }

@@ -1,13 +1,14 @@
 use std::f64::consts::PI;
 
 use super::*;
-use crate::brdf::materials;
+use crate::brdf::{Brdf, materials};
 
 #[cfg(feature = "fit")]
 fn library() -> Library {
     let mut library = Library::new(300).unwrap();
     for material in materials() {
-        library.add(material.name, &material.brdf).unwrap();
+        let values: Vec<_> = library.centres().iter().map(|&at| material.brdf.eval_half_diff(at)).collect();
+        library.add_values(material.name, &values).unwrap();
     }
     library
 }

@@ -1,0 +1,120 @@
+//! The process whose variances a plan reduces.
+
+use std::sync::Arc;
+
+use crate::base::error::{Error, Result};
+use crate::brdf::angles::HalfDiff;
+use crate::gp::Hyper;
+use crate::kernel::{Kernel, Points, Shape};
+use crate::prior::{Colour, Prior};
+use crate::sample::InputSpace;
+
+/// The noise variance of measurements that were not made yet.
+const NOISE: f64 = 1e-4;
+
+/// The variance of `ln f` where nothing is known of other materials.
+const BROAD: f64 = 4.0;
+
+/// A process of the brightness of a material: the covariance `v B(x)^T B(x') + k(x, x')` with the achromatic principal
+/// functions `B` of a learned prior, or `k(x, x')` alone.
+#[derive(Clone, Debug)]
+pub struct Belief {
+    /// The prior whose functions are part of the covariance.
+    pub(super) prior: Option<Arc<Prior>>,
+    /// `v`.
+    pub(super) basis_variance: f64,
+    /// `k`.
+    pub(super) kernel: Kernel,
+    /// The coordinates of the kernel.
+    pub(super) space: InputSpace,
+    /// Noise variance of a measurement.
+    pub(super) noise_variance: f64,
+    /// The variance of `ln f`, mean of the channels, per variance of the process.
+    pub(super) scale: f64,
+}
+
+impl Belief {
+    /// What is known before anything is measured. With a prior: `v = 1`, and a Matern 5/2 kernel whose variance is that
+    /// of what the functions leave of other materials ([`Prior::left`]); without: a variance of 4 of `ln f`. Length
+    /// scales are the usual ones of [`InputSpace::PolarAngles`], and the noise variance is 1e-4.
+    #[must_use]
+    pub fn before(prior: Option<&Arc<Prior>>) -> Self {
+        let space = InputSpace::PolarAngles;
+        let lengths = space.usual_lengths().map(|(median, _)| median);
+        let variance = prior.map_or(BROAD, |prior| prior.left(Colour::Achromatic).powi(2));
+        Self {
+            prior: prior.cloned(),
+            basis_variance: 1.0,
+            kernel: Kernel::ard(variance, Shape::Matern52, &lengths),
+            space,
+            noise_variance: NOISE,
+            scale: scale(prior.is_some()),
+        }
+    }
+
+    /// What is known with the hyper-parameters of a fit; `prior` is the one that it has used, if any.
+    ///
+    /// # Errors
+    /// Hyper-parameters of a process on a lattice, which has no space of its own, and those of a fit with a prior
+    /// without that prior.
+    pub fn of_fit(hyper: &Hyper, prior: Option<&Arc<Prior>>) -> Result<Self> {
+        let Some(space) = hyper.space else {
+            let expected = "those of samples off a lattice";
+            return Err(Error::argument("hyper-parameters of a plan", expected, "those of a lattice"));
+        };
+        let prior = match (hyper.basis_variance, prior) {
+            (None, _) => None,
+            (Some(_), Some(prior)) => Some(prior),
+            (Some(_), None) => {
+                let found = "none";
+                return Err(Error::argument("prior of a plan", "the one that the fit has used", found));
+            }
+        };
+        Ok(Self {
+            prior: prior.cloned(),
+            basis_variance: hyper.basis_variance.unwrap_or(0.0),
+            kernel: hyper.kernel.clone(),
+            space,
+            noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
+            scale: scale(prior.is_some()),
+        })
+    }
+
+    /// Coordinates and functions of directions.
+    pub(super) fn places(&self, angles: &[HalfDiff]) -> Places {
+        let features = self.prior.as_ref().map(|prior| prior.features(Colour::Achromatic, angles));
+        let x: Vec<f64> = angles.iter().flat_map(|&at| self.space.coordinates(at)).collect();
+        Places {
+            points: Points::new(&x, &self.kernel.metric),
+            count: self.prior.as_ref().map_or(0, |prior| prior.n_functions(Colour::Achromatic)),
+            features: features.unwrap_or_default(),
+        }
+    }
+}
+
+/// The variance of the mean of the logarithms of three channels, per variance of their achromatic colour; processes
+/// without a prior are those of the channels themselves.
+fn scale(has_prior: bool) -> f64 {
+    if has_prior { 1.0 / 3.0 } else { 1.0 }
+}
+
+/// Directions as a process sees them.
+#[derive(Clone, Debug)]
+pub(super) struct Places {
+    pub(super) points: Points,
+    /// Number of functions.
+    pub(super) count: usize,
+    /// Values of the functions, one row per direction.
+    pub(super) features: Vec<f64>,
+}
+
+impl Places {
+    pub(super) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// The functions at direction `i`.
+    pub(super) fn row(&self, i: usize) -> &[f64] {
+        &self.features[i * self.count..(i + 1) * self.count]
+    }
+}

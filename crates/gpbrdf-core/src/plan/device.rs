@@ -1,0 +1,190 @@
+//! The pairs of directions that an instrument reaches.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use crate::base::error::{Error, Result};
+use crate::base::random::golden_ratio_subset;
+use crate::brdf::angles::{HalfDiff, direction};
+use crate::sample::InPlaneScan;
+
+/// The largest angle from the normal that an instrument can be said to reach, degrees.
+const MOST_THETA: f64 = 87.0;
+
+/// The range of steps, degrees.
+const STEPS: std::ops::RangeInclusive<f64> = 0.5..=45.0;
+
+/// What rounding may add to an angle, degrees.
+const ROUNDING: f64 = 1e-9;
+
+/// A geometry of measurement: the directions of light and detector, with the light at azimuth 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Geometry {
+    /// Angle between light and normal, degrees.
+    pub theta_i: f64,
+    /// Angle between detector and normal, degrees.
+    pub theta_o: f64,
+    /// Azimuth between light and detector, degrees: 0 on the side of the light, 180 on that of the mirror direction.
+    pub phi_o: f64,
+}
+
+impl Geometry {
+    /// The unit directions `[wi, wo]`.
+    #[must_use]
+    pub fn directions(self) -> [Vector3<f64>; 2] {
+        let wi = direction(self.theta_i.to_radians(), 0.0);
+        [wi, direction(self.theta_o.to_radians(), self.phi_o.to_radians())]
+    }
+
+    /// The half-difference angles.
+    #[must_use]
+    pub fn angles(self) -> HalfDiff {
+        let [wi, wo] = self.directions();
+        HalfDiff::from_directions(&wi, &wo)
+    }
+}
+
+/// The limits of an instrument whose light and detector stand at multiples of a step: polar angles from the normal,
+/// azimuths from the mirror direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device {
+    /// Step of all angles, degrees, 0.5 to 45.
+    pub step: f64,
+    /// Angles between light and normal, degrees; `None` for all multiples of the step up to [`Device::theta_max`].
+    pub incidences: Option<Vec<f64>>,
+    /// The largest angle between detector and normal, degrees, at most 87.
+    pub theta_max: f64,
+    /// Whether the detector stays in the plane of light and normal.
+    pub in_plane: bool,
+    /// The smallest angle between the directions of light and detector, degrees: nearer to each other the detector
+    /// shadows the light.
+    pub min_separation: f64,
+}
+
+impl Default for Device {
+    /// Steps of 5 degrees up to 80 degrees from the normal, with 3 degrees between light and detector.
+    fn default() -> Self {
+        Self {
+            step: 5.0,
+            incidences: None,
+            theta_max: 80.0,
+            in_plane: false,
+            min_separation: InPlaneScan::SHADOW,
+        }
+    }
+}
+
+impl Device {
+    /// At most `most` geometries within these limits.
+    ///
+    /// Of two that are alike by symmetry (light and detector swapped, or turned about the normal where one of them
+    /// stands there) only one is given, with the smaller angle at the light. Where there are more than `most`, they are
+    /// thinned evenly; those nearest to the mirror direction and nearest to the light of each incidence stay.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] for limits out of range, and where nothing is within them.
+    pub fn geometries(&self, most: usize) -> Result<Vec<Geometry>> {
+        self.validate()?;
+        let on_grid = multiples(self.step, self.theta_max);
+        let mut incidences = self.incidences.clone().unwrap_or_else(|| on_grid.clone());
+        incidences.sort_by(f64::total_cmp);
+        incidences.dedup();
+        let mut azimuths = vec![0.0, 180.0];
+        if !self.in_plane {
+            // From the mirror direction, which is reached whatever the step.
+            azimuths = multiples(self.step, 180.0).into_iter().rev().map(|turn| 180.0 - turn).collect();
+        }
+        let has = |list: &[f64], angle: f64| list.iter().any(|other| (other - angle).abs() < ROUNDING);
+        let mut reached = Vec::new();
+        // Of each incidence: the first geometry and the one after the last.
+        let mut runs = Vec::new();
+        for &theta_i in &incidences {
+            let first = reached.len();
+            for &theta_o in &on_grid {
+                if theta_o + ROUNDING < theta_i && has(&incidences, theta_o) && has(&on_grid, theta_i) {
+                    continue;
+                }
+                let is_turned = theta_i < ROUNDING || theta_o < ROUNDING;
+                for &phi_o in if is_turned { &azimuths[azimuths.len() - 1..] } else { &azimuths[..] } {
+                    let geometry = Geometry { theta_i, theta_o, phi_o };
+                    let separation = (2.0 * geometry.angles().theta_d).to_degrees();
+                    if separation + ROUNDING >= self.min_separation {
+                        reached.push(geometry);
+                    }
+                }
+            }
+            runs.push(first..reached.len());
+        }
+        if reached.is_empty() {
+            let expected = "at least one pair of directions within them";
+            return Err(Error::argument("limits of the instrument", expected, format!("none with {self}")));
+        }
+        if reached.len() <= most {
+            return Ok(reached);
+        }
+        let mut is_kept = vec![false; reached.len()];
+        let to_mirror = |g: &Geometry| g.angles().theta_h;
+        let to_light = |g: &Geometry| g.angles().theta_d;
+        for run in runs {
+            for distance in [&to_mirror as &dyn Fn(&Geometry) -> f64, &to_light] {
+                let nearest =
+                    run.clone().min_by(|&a, &b| distance(&reached[a]).total_cmp(&distance(&reached[b])));
+                nearest.into_iter().for_each(|i| is_kept[i] = true);
+            }
+        }
+        let others: Vec<usize> = (0..reached.len()).filter(|&i| !is_kept[i]).collect();
+        let free = most.saturating_sub(reached.len() - others.len());
+        for i in golden_ratio_subset(others.len(), free) {
+            is_kept[others[i]] = true;
+        }
+        Ok(reached.into_iter().zip(is_kept).filter_map(|(g, kept)| kept.then_some(g)).collect())
+    }
+
+    fn validate(&self) -> Result<()> {
+        if !STEPS.contains(&self.step) {
+            let expected = format!("{} to {} degrees", STEPS.start(), STEPS.end());
+            return Err(Error::argument("step of the instrument", expected, self.step));
+        }
+        let polar = 0.0..=MOST_THETA;
+        if !polar.contains(&self.theta_max) {
+            let expected = format!("0 to {MOST_THETA} degrees");
+            return Err(Error::argument("largest angle from the normal", expected, self.theta_max));
+        }
+        if !(0.0..=180.0).contains(&self.min_separation) {
+            return Err(Error::argument("smallest separation", "0 to 180 degrees", self.min_separation));
+        }
+        let Some(incidences) = &self.incidences else { return Ok(()) };
+        let expected = || format!("at least one, each from 0 to {MOST_THETA} degrees");
+        match incidences.iter().find(|angle| !polar.contains(*angle)) {
+            Some(angle) => Err(Error::argument("incidences", expected(), angle)),
+            None if incidences.is_empty() => Err(Error::argument("incidences", expected(), "none")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The limits in words.
+impl fmt::Display for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { step, theta_max, min_separation, .. } = self;
+        write!(f, "steps of {step} degrees, light at ")?;
+        match &self.incidences {
+            None => write!(f, "0 to {theta_max}")?,
+            Some(list) => {
+                let list: Vec<String> = list.iter().map(ToString::to_string).collect();
+                write!(f, "{}", list.join(", "))?;
+            }
+        }
+        let plane = if self.in_plane { " in the plane of incidence" } else { "" };
+        write!(
+            f,
+            " degrees from the normal, detector{plane} up to {theta_max}, at least {min_separation} degrees apart"
+        )
+    }
+}
+
+/// The multiples of a step from 0 to a limit.
+fn multiples(step: f64, limit: f64) -> Vec<f64> {
+    (0u32..).map(|k| f64::from(k) * step).take_while(|angle| *angle <= limit + ROUNDING).collect()
+}

@@ -1,0 +1,232 @@
+use std::sync::Arc;
+
+use super::*;
+use crate::brdf::{angles::HalfDiff, materials};
+use crate::gp::Solver;
+use crate::judge::Environment;
+use crate::model::{FitOptions, IntervalOf, PriorChoice, condition};
+use crate::prior::{LearnOptions, Library, Prior, learn};
+use crate::sample::{Sample, SampleSet};
+use crate::{Brdf, Hyper};
+
+fn prior() -> Arc<Prior> {
+    let mut library = Library::new(200).unwrap();
+    for material in materials() {
+        let values: Vec<_> = library.centres().iter().map(|&at| material.brdf.eval_half_diff(at)).collect();
+        library.add_values(material.name, &values).unwrap();
+    }
+    Arc::new(learn("test", &library, &LearnOptions { functions: [8, 4] }).unwrap())
+}
+
+fn coarse() -> Device {
+    Device { step: 15.0, theta_max: 75.0, ..Device::default() }
+}
+
+/// The variances that a plan expects are those of the process that is conditioned on the planned measurements.
+#[test]
+fn expected_errors_are_those_of_the_conditioned_process() {
+    let prior = prior();
+    let candidates = coarse().geometries(MOST_CANDIDATES).unwrap();
+    let cells = Cells::hemisphere(300).unwrap();
+    for prior in [Some(&prior), None] {
+        let belief = Belief::before(prior);
+        let found = plan(&belief, &[], &candidates, &cells, Goal::Count(9)).unwrap();
+        let material = &materials()[3].brdf;
+        let sample = |geometry: &Geometry| {
+            let [wi, wo] = geometry.directions();
+            Sample { wi, wo, value: material.eval(&wi, &wo) }
+        };
+        for count in [1, 4, 9] {
+            let samples: SampleSet = found.geometries[..count].iter().map(sample).collect();
+            let own = Hyper::new(
+                Solver::Scattered,
+                belief.kernel.clone(),
+                belief.noise_variance,
+                Some(belief.space),
+            );
+            let hyper = Hyper {
+                basis_variance: prior.map(|_| 1.0),
+                chromatic: prior.map(|_| Box::new(Hyper { basis_variance: Some(1e-9), ..own.clone() })),
+                ..own
+            };
+            let choice = prior.map_or(PriorChoice::None, |prior| PriorChoice::Learned(Arc::clone(prior)));
+            let options = FitOptions { prior: choice, ..FitOptions::default() };
+            let model = condition(&samples, &options, &hyper).unwrap().model;
+            let variances = model.predict_variance(&cells.angles, IntervalOf::Latent).unwrap();
+            let mut expected: f64 = variances.iter().zip(&cells.weights).map(|(v, w)| v[0] * w).sum();
+            if let Some(hyper) = hyper.chromatic {
+                // The chromatic colours of the model have the same kernel and nearly no functions.
+                let chromatic = Belief { prior: None, scale: 1.0, ..Belief::of_fit(&hyper, prior).unwrap() };
+                let chromatic = expected_error(&chromatic, &samples.angles, &cells).unwrap().powi(2);
+                expected -= 2.0 / 3.0 * chromatic;
+            }
+            let own = found.errors[count].powi(2);
+            assert!((own / expected - 1.0).abs() < 1e-4, "{count}: {own} {expected}");
+            let again = expected_error(&belief, &samples.angles, &cells).unwrap();
+            assert!((again / found.errors[count] - 1.0).abs() < 1e-9, "{count}");
+        }
+        assert!(found.errors.windows(2).all(|pair| pair[1] < pair[0]), "{:?}", found.errors);
+    }
+}
+
+/// The first choice is the best of all single measurements, and choices go on from measurements as from choices.
+#[test]
+fn choices_are_the_best_ones_and_may_be_made_in_stages() {
+    let candidates = Device { step: 30.0, theta_max: 60.0, ..Device::default() }.geometries(1000).unwrap();
+    let cells = Cells::hemisphere(200).unwrap();
+    let belief = Belief::before(Some(&prior()));
+    let whole = plan(&belief, &[], &candidates, &cells, Goal::Count(8)).unwrap();
+    let single = candidates.iter().map(|g| expected_error(&belief, &[g.angles()], &cells).unwrap());
+    let best = single.fold(f64::INFINITY, f64::min);
+    assert!((whole.errors[1] / best - 1.0).abs() < 1e-9, "{} {best}", whole.errors[1]);
+    let known: Vec<HalfDiff> = whole.geometries[..3].iter().map(|g| g.angles()).collect();
+    let rest = plan(&belief, &known, &candidates, &cells, Goal::Count(5)).unwrap();
+    assert_eq!(rest.geometries, whole.geometries[3..]);
+    assert!(rest.errors.iter().zip(&whole.errors[3..]).all(|(a, b)| (a / b - 1.0).abs() < 1e-9));
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| plan(&belief, &known, &candidates, &cells, Goal::Count(5)).unwrap())
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn plans_end_with_their_goal_or_say_how_far_they_get() {
+    let candidates = coarse().geometries(MOST_CANDIDATES).unwrap();
+    let cells = Cells::hemisphere(200).unwrap();
+    let belief = Belief::before(None);
+    let run = |goal| plan(&belief, &[], &candidates, &cells, goal);
+    let found = run(Goal::Error(1.0)).unwrap();
+    let errors = &found.errors;
+    assert!(
+        (errors[0] - 2.0).abs() < 1e-12 && errors[errors.len() - 1] <= 1.0 && errors[errors.len() - 2] > 1.0
+    );
+    assert_eq!(found.geometries.len() + 1, errors.len());
+    let message = run(Goal::Error(1e-6)).unwrap_err().to_string();
+    let all = candidates.len();
+    assert!(message.contains(&format!("which {all} directions reach, found 0.000001")), "{message}");
+    let message = run(Goal::Count(all + 1)).unwrap_err().to_string();
+    let expected = format!("expected at most {all}, the directions to choose from, found {}", all + 1);
+    assert!(message.ends_with(&expected), "{message}");
+    assert!(run(Goal::Error(0.0)).is_err() && run(Goal::Error(f64::NAN)).is_err());
+    assert!(plan(&belief, &[], &[], &cells, Goal::Count(0)).is_err());
+    // All of them, each once.
+    let mut every = run(Goal::Count(all)).unwrap().geometries;
+    let order = |g: &Geometry, h: &Geometry| {
+        [g.theta_i, g.theta_o, g.phi_o].partial_cmp(&[h.theta_i, h.theta_o, h.phi_o]).unwrap()
+    };
+    every.sort_by(order);
+    assert_eq!(every, candidates);
+}
+
+#[test]
+fn geometries_keep_to_the_limits_and_none_is_there_twice() {
+    let devices = [
+        Device::default(),
+        Device { step: 2.0, ..Device::default() },
+        Device { step: 7.0, ..Device::default() },
+        Device { in_plane: true, min_separation: 12.0, ..Device::default() },
+        Device { incidences: Some(vec![70.0, 12.5, 40.0]), theta_max: 60.0, ..Device::default() },
+    ];
+    for device in devices {
+        let found = device.geometries(MOST_CANDIDATES).unwrap();
+        assert!(found.len() <= MOST_CANDIDATES);
+        for Geometry { theta_i, theta_o, phi_o } in &found {
+            let is_multiple = |x: f64| (x / device.step - (x / device.step).round()).abs() < 1e-9;
+            assert!(is_multiple(*theta_o) && is_multiple(180.0 - *phi_o) && *theta_o <= device.theta_max);
+            match &device.incidences {
+                Some(list) => assert!(list.contains(theta_i)),
+                None => assert!(is_multiple(*theta_i) && *theta_i <= device.theta_max),
+            }
+            assert!((0.0..=180.0).contains(phi_o) && (!device.in_plane || phi_o % 180.0 == 0.0));
+        }
+        for (k, geometry) in found.iter().enumerate() {
+            let [wi, wo] = geometry.directions();
+            let separation = wi.dot(&wo).clamp(-1.0, 1.0).acos().to_degrees();
+            assert!(separation > device.min_separation - 1e-4, "{geometry:?}");
+            if device.step > 4.0 {
+                let at = geometry.angles();
+                let is_same = |other: &Geometry| {
+                    let b = other.angles();
+                    let mirrored =
+                        (at.phi_d - b.phi_d).abs().min((at.phi_d + b.phi_d - std::f64::consts::PI).abs());
+                    (at.theta_h - b.theta_h).abs() + (at.theta_d - b.theta_d).abs() + mirrored < 1e-9
+                };
+                assert!(!found[..k].iter().any(is_same), "{geometry:?}");
+            }
+        }
+        // Mirror directions as far as they are reached.
+        for theta_i in device.incidences.clone().unwrap_or_else(|| vec![20.0, 60.0]) {
+            let of = || found.iter().filter(|g| g.theta_i == theta_i);
+            let nearest = of().map(|g| g.angles().theta_h.to_degrees()).fold(90.0, f64::min);
+            assert!(
+                nearest <= 0.26 * device.step + (theta_i - device.theta_max).max(0.0),
+                "{device:?} {nearest}"
+            );
+        }
+    }
+}
+
+#[test]
+fn limits_out_of_range_are_refused() {
+    let device = Device::default();
+    let refused = |device: Device| device.geometries(100).unwrap_err().to_string();
+    assert!(refused(Device { step: 0.0, ..device.clone() }).ends_with("expected 0.5 to 45 degrees, found 0"));
+    assert!(refused(Device { theta_max: 90.0, ..device.clone() }).contains("0 to 87 degrees, found 90"));
+    assert!(refused(Device { min_separation: -1.0, ..device.clone() }).contains("0 to 180 degrees"));
+    for incidences in [vec![], vec![f64::NAN], vec![10.0, 88.0]] {
+        assert!(refused(Device { incidences: Some(incidences), ..device.clone() }).contains("incidences"));
+    }
+    let nothing = Device { theta_max: 40.0, min_separation: 120.0, ..device };
+    assert!(refused(nothing).starts_with("limits of the instrument: expected at least one pair"));
+}
+
+#[test]
+fn tours_visit_all_and_are_no_longer_than_the_order_of_rank() {
+    let candidates = Device::default().geometries(MOST_CANDIDATES).unwrap();
+    let order: Vec<usize> = crate::base::random::golden_ratio_subset(candidates.len(), 60);
+    let geometries: Vec<Geometry> = order.iter().map(|&i| candidates[i]).collect();
+    for costs in [AxisCosts::default(), AxisCosts { theta_i: 20.0, phi_o: 0.1, ..AxisCosts::default() }] {
+        let found = tour(&geometries, &costs);
+        let rank: Vec<usize> = (0..60).collect();
+        let mut visited = found.clone();
+        visited.sort_unstable();
+        assert_eq!(visited, rank);
+        let [short, long] = [&found, &rank].map(|order| costs.of_way(&geometries, order));
+        assert!(short < 0.6 * long, "{short} {long}");
+    }
+    // The expensive axis turns least.
+    let turned = |costs: AxisCosts| {
+        let found = tour(&geometries, &costs);
+        found.windows(2).map(|w| (geometries[w[0]].theta_i - geometries[w[1]].theta_i).abs()).sum::<f64>()
+    };
+    assert!(turned(AxisCosts { theta_i: 50.0, ..AxisCosts::default() }) < 100.0);
+    assert!(tour(&[], &AxisCosts::default()).is_empty());
+    let same = [geometries[0]; 3];
+    assert_eq!(tour(&same, &AxisCosts::default()).len(), 3);
+}
+
+#[test]
+fn cells_of_an_environment_are_those_that_its_light_reaches() {
+    let cells = Cells::environment(&Environment::studio(), 1000).unwrap();
+    assert_eq!((cells.len(), cells.weights.len()), (1000, 1000));
+    assert!((cells.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!(cells.angles.iter().all(|at| at.is_above_horizon()));
+    // The key light stands 58 degrees from the viewer, who looks along the axis of the sphere: theta_d is about 29.
+    let mean = |cells: &Cells| {
+        cells.angles.iter().zip(&cells.weights).map(|(at, w)| w * at.theta_d.to_degrees()).sum::<f64>()
+    };
+    let narrow = |cells: &Cells| {
+        let near = |at: &HalfDiff| (at.theta_d.to_degrees() - 29.0).abs() < 8.0;
+        cells.angles.iter().zip(&cells.weights).filter(|(at, _)| near(at)).map(|(_, w)| w).sum::<f64>()
+    };
+    let even = Cells::hemisphere(1000).unwrap();
+    assert!(narrow(&cells) > narrow(&even), "{} {}", narrow(&cells), narrow(&even));
+    assert!((15.0..50.0).contains(&mean(&cells)) && (15.0..50.0).contains(&mean(&even)));
+    assert!(Cells::hemisphere(0).is_err() && Cells::warped_box(0).is_err());
+    let near_mirror = |cells: &Cells| cells.angles.iter().filter(|at| at.theta_h < 0.1).count();
+    let warped = Cells::warped_box(1000).unwrap();
+    assert!(near_mirror(&warped) > 5 * near_mirror(&even) && warped.weights.iter().all(|w| *w >= 0.0));
+    let black = crate::base::raster::Raster::filled(4, 2, [0.0f32; 3]);
+    assert!(Cells::environment(&Environment::new(black).unwrap(), 10).is_err());
+}
