@@ -110,25 +110,24 @@ fn models_come_back_from_files_and_from_their_hyper_parameters() {
     assert!((0.1..=1.0).contains(&share) && report["prior"] == "test", "{report}");
 }
 
-/// Twenty measurements of a plastic among other materials: better with what these have in common.
+/// Ten measurements of a plastic among other materials: better with what these have in common.
 #[test]
 fn a_prior_helps_where_measurements_are_few() {
-    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 20));
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 10));
     let truth = material("red-plastic").unwrap();
-    let layout = Layout::Hemisphere { count: 500, seed: 77 };
+    // Half of them near the mirror direction, which random measurements miss.
+    let layout = Layout::Random { count: 500, seed: 77 };
     let others = SampleSet::measure(&truth.brdf, &layout).unwrap();
     let error = |options: &FitOptions| {
         let model = fit(&samples, options).unwrap().model;
         let log = |f: f64| Prior::TRANSFORM.forward(f);
-        let mut errors: Vec<f64> = (model.predict_mean(&others.angles).iter().zip(&others.values))
-            .map(|(a, b)| (log(a[0]) - log(b[0])).abs())
-            .collect();
-        errors.sort_by(f64::total_cmp);
-        errors[errors.len() / 2]
+        let values = model.predict_mean(&others.angles);
+        let squares = values.iter().zip(&others.values).map(|(a, b)| (log(a[0]) - log(b[0])).powi(2));
+        (squares.sum::<f64>() / values.len() as f64).sqrt()
     };
     let without = FitOptions { prior: PriorChoice::None, ..FitOptions::default() };
     let (with, without) = (error(&options(&prior)), error(&without));
-    assert!(with < 0.8 * without, "{with} {without}");
+    assert!(with < 0.9 * without, "{with} {without}");
 }
 
 #[test]
