@@ -155,7 +155,8 @@ fn geometries_keep_to_the_limits_and_none_is_there_twice() {
             }
         }
         // Mirror directions as far as they are reached.
-        for theta_i in device.incidences.clone().unwrap_or_else(|| vec![20.0, 60.0]) {
+        for theta_i in device.incidences.clone().unwrap_or_else(|| vec![4.0 * device.step, 8.0 * device.step])
+        {
             let of = || found.iter().filter(|g| g.theta_i == theta_i);
             let nearest = of().map(|g| g.angles().theta_h.to_degrees()).fold(90.0, f64::min);
             assert!(
