@@ -53,6 +53,7 @@ pub struct Watch {
     observer: Observer,
     /// Evaluations of the likelihood in the whole work, and those before this part.
     evaluations: Arc<AtomicUsize>,
+    #[cfg_attr(not(feature = "fit"), expect(dead_code, reason = "only a search counts evaluations"))]
     evaluations_before: usize,
     /// The bits of the largest share so far. Those of numbers that are not negative have the order of the numbers.
     reached: Arc<AtomicU64>,

@@ -178,7 +178,8 @@ pub struct Conditioned {
 }
 
 /// Fits a model to samples: transforms their values to targets, finds hyper-parameters by maximum marginal
-/// likelihood, and conditions the process at them.
+/// likelihood, and conditions the process at them. Where a prior is to be used ([`FitOptions::prior`]), a model
+/// without it is fitted as well, and the one with the larger marginal likelihood is taken.
 ///
 /// # Errors
 /// No samples, values that are not finite, invalid options, the lattice solver for samples off a lattice, a
@@ -186,6 +187,31 @@ pub struct Conditioned {
 pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     let prior = options.prior(samples);
     let options = &options.with_mean_of(prior.as_ref());
+    if let Some(prior) = &prior {
+        // Both are densities of the same targets, since the rotation of the channels changes no volume. A prior that
+        // the samples contradict, of a constant for example, is not taken.
+        let with = fit_with(samples, options, Some(prior))?;
+        let without =
+            fit_with(samples, &FitOptions { mean: MeanFunction::Constant, ..options.clone() }, None)?;
+        return Ok(if with.log_marginal_likelihood() >= without.log_marginal_likelihood() {
+            with
+        } else {
+            without
+        });
+    }
+    fit_with(samples, options, None)
+}
+
+impl Fit {
+    /// The log marginal likelihood, summed over the channels.
+    #[must_use]
+    pub fn log_marginal_likelihood(&self) -> f64 {
+        self.reports.iter().map(|report| report.log_marginal_likelihood).sum()
+    }
+}
+
+/// [`fit`] with a given prior, or with none.
+fn fit_with(samples: &SampleSet, options: &FitOptions, prior: Option<&Arc<Prior>>) -> Result<Fit> {
     let (targets, offsets) = targets(samples, options)?;
     if options.kernel.iter().any(Vec::is_empty) {
         return Err(Error::argument("kernel", "at least one shape", "none"));
@@ -198,7 +224,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
         let watch = watch.part(share(group), share(group + 1));
         let noise = known_noise(samples, options.transform, channels);
         let targets = channels.iter().map(|&c| targets[c].clone()).collect();
-        options.solver.fit(&options.problem(samples, targets, &noise, prior.clone(), &watch))
+        options.solver.fit(&options.problem(samples, targets, &noise, prior.cloned(), &watch))
     });
     let (posteriors, reports) = fitted.collect::<Result<Vec<_>>>()?.into_iter().unzip();
     let origin = samples.origin.clone();

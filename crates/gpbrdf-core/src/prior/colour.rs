@@ -32,6 +32,7 @@ pub(crate) const OPPONENT: [[f64; 3]; 3] = [
 ];
 
 /// The three colours of the logarithms of three channels.
+#[cfg(any(feature = "fit", test))]
 pub(crate) fn to_opponent(channels: [f64; 3]) -> [f64; 3] {
     OPPONENT.map(|row| row.iter().zip(channels).map(|(m, x)| m * x).sum())
 }

@@ -108,7 +108,7 @@ impl Prior {
         let width = mean.len();
         let span = Span::new(width.saturating_sub(1))?;
         let functions = |values: Vec<f64>| {
-            if values.len() % width != 0 {
+            if !values.len().is_multiple_of(width) {
                 let expected = format!("rows of {width}");
                 return Err(Error::argument("coefficients of a prior", expected, values.len()));
             }

@@ -62,6 +62,7 @@ impl Span {
         self.centres.len()
     }
 
+    #[cfg(feature = "fit")]
     pub(crate) fn centres(&self) -> &[HalfDiff] {
         &self.centres
     }

@@ -48,6 +48,7 @@ impl Process<'_> {
     }
 
     /// Covariance of two samples, without noise.
+    #[cfg(feature = "fit")]
     pub(super) fn covariance(&self, i: usize, j: usize) -> f64 {
         self.kernel.value(self.point(i), self.point(j)) + self.in_basis(self.basis.row(i), self.basis.row(j))
     }
