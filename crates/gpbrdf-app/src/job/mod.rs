@@ -35,7 +35,6 @@ pub(crate) use forecast::{remaining, samples_within};
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
-#[cfg(feature = "viewer")]
 pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]
