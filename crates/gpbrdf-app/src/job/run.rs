@@ -9,8 +9,8 @@ use gpbrdf_core::judge::{CellMetrics, Interval, LeftOut};
 use gpbrdf_core::model::Conditioned;
 use gpbrdf_core::model::bake_sigma_observed;
 use gpbrdf_core::{
-    BrdfTable, CompressOptions, Content, Environment, Error, Fit, FitOptions, FitReport, Metrics, Model,
-    Progress, SigmaTable, Source, compress, condition, fit,
+    BrdfTable, CompressOptions, Content, Environment, Error, Fit, FitOptions, FitReport, Hyper, Metrics,
+    Model, Progress, SigmaTable, Source, compress, condition, fit,
 };
 
 use super::backend::Backend;
@@ -247,7 +247,13 @@ impl Run {
         self.stage(Stage::Fit, || {
             // Hyper-parameters of one solver mean nothing to another.
             let solver = options.solver.resolve(samples.lattice().is_some());
-            if let Some(hyper) = spec.hyper.as_ref().filter(|hyper| hyper.solver == solver) {
+            // Those of a learned prior fit where one is used, on a lattice of few nodes as well.
+            let learned = options.prior(&samples).is_some();
+            let fits = |hyper: &Hyper| match hyper.chromatic {
+                Some(_) => learned,
+                None => hyper.solver == solver,
+            };
+            if let Some(hyper) = spec.hyper.as_ref().filter(|hyper| fits(hyper)) {
                 let Conditioned { model, log_marginal_likelihood } = condition(&samples, &options, hyper)?;
                 let log_marginal_likelihood = Some(log_marginal_likelihood);
                 let fitted = Fitted::from_file(Arc::new(model));
