@@ -15,13 +15,13 @@ const PRODUCTS: f64 = 23.0;
 /// Time of everything that grows in proportion to the number of samples, relative to that of a kernel value: the
 /// search, whose likelihood has a fixed number of terms for many samples, leave-one-out predictions, the
 /// preconditioner.
-const PER_SAMPLE: f64 = 4.5e4;
+const PER_SAMPLE: f64 = 9e4;
 
 /// Memory of a sample: 200 inducing points twice, 48 neighbours, nine columns and their partial sums.
 const BYTES: f64 = 8.0 * (2.0 * 200.0 + 1.5 * 48.0 + 9.0 * (5.0 + 16.0));
 
 /// Time of the search itself, relative to that of a kernel value.
-const SEARCH: f64 = 3e8;
+const SEARCH: f64 = 6e8;
 
 /// Evaluations of the likelihood that a search usually takes, both spaces and all renewed weights together.
 pub(super) const EVALUATIONS: usize = 110;
