@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use gpbrdf_core::model::PriorChoice;
 use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{
     CompressOptions, FitOptions, InducingSize, LatticeLayout, Layout, MeanFunction, Model, Provenance, Shape,
@@ -146,15 +147,17 @@ fn dense_bakes_are_the_core_s_for_every_kernel(context: &Context) {
     let options = FitOptions { per_channel: true, ..FitOptions::default() }.with_kernel(&sum);
     let error = dense_error(context, &dense_model(30, Symmetry::Bilateral, options));
     assert!(error < 1e-4, "sum of kernels: {error:e}");
-    // The scattered solver, in both of its spaces.
+    // The scattered solver, in both of its spaces, without and with a learned prior.
     for space in InputSpace::ISOTROPIC {
-        let source = Source::built_in("cherry-235").unwrap();
-        let samples = source.measure(&Layout::Random { count: 60, seed: 2 }).unwrap();
-        let options = FitOptions { space: Some(space), ..FitOptions::default() };
-        let model = fit(&samples, &options).unwrap().model;
-        assert_eq!((model.solver(), model.space()), ("scattered", space));
-        let error = dense_error(context, &model);
-        assert!(error < 1e-4, "{space:?}: {error:e}");
+        for (prior, solver) in [(PriorChoice::None, "scattered"), (PriorChoice::BuiltIn, "learned")] {
+            let source = Source::built_in("cherry-235").unwrap();
+            let samples = source.measure(&Layout::Random { count: 60, seed: 2 }).unwrap();
+            let options = FitOptions { space: Some(space), prior, ..FitOptions::default() };
+            let model = fit(&samples, &options).unwrap().model;
+            assert_eq!((model.solver(), model.space()), (solver, space));
+            let error = dense_error(context, &model);
+            assert!(error < 1e-4, "{solver} {space:?}: {error:e}");
+        }
     }
 }
 
