@@ -199,8 +199,8 @@ impl Context {
         samples_within(self.budget, terms, MAX_DENSE)
     }
 
-    /// Fits a model to samples without a learned prior, bakes it and compares it with the truth. With `interval` sigma is baked too,
-    /// for the coverage of the interval.
+    /// Fits a model to samples without a learned prior, bakes it and compares it with the truth. With `interval`
+    /// sigma is baked too, for the coverage of the interval.
     pub(super) fn fit_and_compare(
         &self,
         truth: &BrdfTable,
