@@ -13,7 +13,7 @@ impl Colour {
     /// Both kinds.
     pub const ALL: [Self; 2] = [Self::Achromatic, Self::Chromatic];
 
-    /// The rows of [`OPPONENT`] that are of this kind.
+    /// Which of the three colours are of this kind, the achromatic one being the first.
     #[must_use]
     pub fn rows(self) -> std::ops::Range<usize> {
         match self {
