@@ -9,10 +9,11 @@ pub mod number;
 pub(crate) mod random;
 pub(crate) mod raster;
 pub(crate) mod simd;
+pub(crate) mod tensor_file;
 pub(crate) mod watch;
 
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
 pub use error::{Error, Result};
-pub use random::{SplitMix64, golden_ratio_subset};
+pub use random::{SplitMix64, golden_ratio_subset, quasi_random};
 pub use raster::Raster;
 pub use watch::{Observer, Progress, Steps, Watch};

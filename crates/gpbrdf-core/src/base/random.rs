@@ -69,6 +69,14 @@ pub fn golden_ratio_subset(n: usize, count: usize) -> Vec<usize> {
     order
 }
 
+/// Point `i` of an additive recurrence that fills the unit cube evenly: `frac(1/2 + i g^-k)` for `k = 1, 2, 3`, where
+/// `g^4 = g + 1`. Source: M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
+#[must_use]
+pub fn quasi_random(i: usize) -> [f64; 3] {
+    const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_900_4];
+    STEPS.map(|step| (0.5 + step * i as f64).fract())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -14,16 +14,19 @@
 
 use std::path::Path;
 
-use safetensors::tensor::SafeTensors;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
+use crate::base::tensor_file;
 use crate::gp::solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::model::Model;
 use crate::sample::{MeanFunction, Provenance, Transform};
+
+/// The key of the description in the file's metadata.
+const KEY: &str = "gpbrdf";
 
 /// The version of the format that is written, and the only one that is read.
 const VERSION: u32 = 2;
@@ -45,11 +48,6 @@ struct Header {
 struct PosteriorHeader {
     solver: String,
     process: Value,
-}
-
-#[derive(Deserialize)]
-struct VersionOnly {
-    version: u32,
 }
 
 impl Model {
@@ -86,7 +84,7 @@ impl Model {
         let unwritable = |what: &dyn std::fmt::Display| Error::argument("model", "finite numbers", what);
         let json = serde_json::to_string(&header).map_err(|e| unwritable(&e))?;
         let views = tensors.views().map_err(|e| unwritable(&e))?;
-        let metadata = [("gpbrdf".to_owned(), json)].into_iter().collect();
+        let metadata = [(KEY.to_owned(), json)].into_iter().collect();
         safetensors::serialize(views, Some(metadata)).map_err(|e| unwritable(&e))
     }
 
@@ -114,21 +112,9 @@ impl Model {
             expected: expected.to_owned(),
             found,
         };
-        let parsed = |e: safetensors::SafeTensorError| wrong("a safetensors file", e.to_string());
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(parsed)?;
-        let tensors = SafeTensors::deserialize(bytes).map_err(parsed)?;
-        let json = metadata
-            .metadata()
-            .as_ref()
-            .and_then(|m| m.get("gpbrdf"))
-            .ok_or_else(|| wrong("the metadata entry \"gpbrdf\"", "none".into()))?;
-        let version: VersionOnly =
-            serde_json::from_str(json).map_err(|e| wrong("a version number", e.to_string()))?;
-        if version.version != VERSION {
-            return Err(wrong(&format!("version {VERSION}"), format!("version {}", version.version)));
-        }
+        let (tensors, json) = tensor_file::open(bytes, (KEY, VERSION), &wrong)?;
         let header: Header =
-            serde_json::from_str(json).map_err(|e| wrong("metadata of a model", e.to_string()))?;
+            serde_json::from_str(&json).map_err(|e| wrong("metadata of a model", e.to_string()))?;
         header.transform.validate().map_err(|e| wrong("a consistent model", e.to_string()))?;
         let posteriors = header.posteriors.into_iter().enumerate().map(|(posterior, header)| {
             let tensors = TensorReader { tensors: &tensors, posterior, path };

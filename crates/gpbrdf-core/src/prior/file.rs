@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 
 use super::{Functions, Prior, Span};
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
+use crate::base::tensor_file;
 use crate::gp::table::to_f32;
 use crate::gp::{TensorReader, TensorWriter};
 
@@ -145,16 +146,9 @@ impl Prior {
             expected: expected.to_owned(),
             found,
         };
-        let parsed = |e: safetensors::SafeTensorError| wrong("a safetensors file", e.to_string());
-        let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(parsed)?;
-        let tensors = SafeTensors::deserialize(bytes).map_err(parsed)?;
-        let json = metadata.metadata().as_ref().and_then(|m| m.get(KEY));
-        let json = json.ok_or_else(|| wrong("a learned prior", format!("no metadata entry \"{KEY}\"")))?;
+        let (tensors, json) = tensor_file::open(bytes, (KEY, VERSION), &wrong)?;
         let header: PriorHeader =
-            serde_json::from_str(json).map_err(|e| wrong("metadata of a prior", e.to_string()))?;
-        if header.version != VERSION {
-            return Err(wrong(&format!("version {VERSION}"), format!("version {}", header.version)));
-        }
+            serde_json::from_str(&json).map_err(|e| wrong("metadata of a prior", e.to_string()))?;
         let read = |name: &str| -> Result<Vec<f64>> {
             let tensor =
                 tensors.tensor(name).map_err(|e| wrong(&format!("a tensor \"{name}\""), e.to_string()))?;
