@@ -9,6 +9,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::Vector3;
 
+use crate::base::error::{Error, Result};
+
 /// Lower bound of cosines in denominators: smaller ones are replaced by it, so that quotients stay bounded.
 pub const HORIZON_COSINE: f64 = 1e-6;
 
@@ -88,6 +90,14 @@ impl HalfDiff {
     pub fn is_above_horizon(self) -> bool {
         let (a, b) = self.cosines();
         a.min(b) > 0.0
+    }
+}
+
+/// Refuses angles that are not finite.
+pub(crate) fn check_finite(angles: &[HalfDiff]) -> Result<()> {
+    match angles.iter().find(|angles| !angles.is_finite()) {
+        None => Ok(()),
+        Some(bad) => Err(Error::argument("angles", "finite numbers", format!("{bad:?}"))),
     }
 }
 

@@ -19,6 +19,9 @@ use nalgebra::Vector3;
 /// A linear sRGB triple. For a BRDF its unit is sr^-1.
 pub type Rgb = [f64; 3];
 
+/// Weights of red, green and blue in the luminance of linear sRGB (ITU-R BT.709).
+pub const LUMINANCE_WEIGHTS: Rgb = [0.2126, 0.7152, 0.0722];
+
 /// A bidirectional reflectance distribution function with three colour channels. Tables, samples and models
 /// take it to be isotropic.
 pub trait Brdf: Send + Sync {

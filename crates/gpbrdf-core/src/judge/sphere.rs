@@ -164,18 +164,27 @@ impl ShadingFrame {
         Some(Self { e, f: normal.cross(&e), normal, wo, min_cosine: GRAZING_COSINE })
     }
 
+    /// The directions `(wi, wo)` to a light in the unit direction `light` and to the viewer, in the local frame. `None`
+    /// if the cosine at the light is not positive or is below the `min_cosine` of the frame.
+    #[inline]
+    #[must_use]
+    pub fn directions(&self, light: &Vector3<f64>) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let cosine = light.dot(&self.normal);
+        if !(cosine > 0.0) || cosine < self.min_cosine {
+            return None;
+        }
+        Some((Vector3::new(light.dot(&self.e), light.dot(&self.f), cosine), self.wo))
+    }
+
     /// Adds the radiance `f(wi, wo) cos theta_i irradiance` that the point reflects towards the viewer to
     /// `sums`, one for each table. The light comes from the unit direction `light`; `irradiance` is that of a
     /// surface that faces it. `f` is looked up trilinearly. Nothing is added if the cosine is not positive or
     /// is below the `min_cosine` of the frame.
     #[inline]
     pub fn add_light(&self, tables: &[&BrdfTable], light: &Vector3<f64>, irradiance: Rgb, sums: &mut [Rgb]) {
-        let cosine = light.dot(&self.normal);
-        if !(cosine > 0.0) || cosine < self.min_cosine {
-            return;
-        }
-        let wi = Vector3::new(light.dot(&self.e), light.dot(&self.f), cosine);
-        let at = Trilinear::new(half_diff(&wi, &self.wo));
+        let Some((wi, wo)) = self.directions(light) else { return };
+        let cosine = wi.z;
+        let at = Trilinear::new(half_diff(&wi, &wo));
         for (table, sum) in tables.iter().zip(sums) {
             let value = table.lookup(&at);
             for c in 0..3 {

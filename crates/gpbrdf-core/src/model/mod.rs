@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 use crate::base::error::{Error, Result};
-use crate::brdf::angles::HalfDiff;
+use crate::brdf::angles::{HalfDiff, check_finite};
 use crate::brdf::{Brdf, Rgb};
 use crate::gp::{Hyper, Posterior};
 use crate::sample::{InputSpace, MeanFunction, Provenance, Transform};
@@ -182,9 +182,7 @@ impl Model {
     /// # Errors
     /// Angles that are not finite, or a covariance that cannot be factorised or does not fit in memory.
     pub fn predict_variance(&self, angles: &[HalfDiff], of: IntervalOf) -> Result<Vec<Rgb>> {
-        if let Some(bad) = angles.iter().find(|a| !a.is_finite()) {
-            return Err(Error::argument("angles", "finite numbers", format!("{bad:?}")));
-        }
+        check_finite(angles)?;
         let mut out = vec![[0.0; 3]; angles.len()];
         for (first, posterior) in self.posteriors() {
             let (count, channels) = (posterior.n_variances(), posterior.n_channels());

@@ -52,11 +52,12 @@ impl Belief {
         }
     }
 
-    /// What is known with the hyper-parameters of a fit; `prior` is the one that it has used, if any.
+    /// What is known with the hyper-parameters of a fit; `prior` is the one that it has used, if any, before it was
+    /// adapted to the samples.
     ///
     /// # Errors
-    /// Hyper-parameters of a process on a lattice, which has no space of its own, and those of a fit with a prior
-    /// without that prior.
+    /// Hyper-parameters of a process on a lattice, which has no space of its own, those of a fit with a prior without
+    /// that prior, and those of a fit with another one.
     pub fn of_fit(hyper: &Hyper, prior: Option<&Arc<Prior>>) -> Result<Self> {
         let Some(space) = hyper.space else {
             let expected = "those of samples off a lattice";
@@ -70,20 +71,21 @@ impl Belief {
                 return Err(Error::argument("prior of a plan", "the one that the fit has used", found));
             }
         };
+        let prior = prior.map(|prior| prior.weighted(&hyper.library_weights)).transpose()?;
         Ok(Self {
-            prior: prior.cloned(),
+            scale: scale(prior.is_some()),
+            prior,
             basis_variance: hyper.basis_variance.unwrap_or(0.0),
             kernel: hyper.kernel.clone(),
             space,
             noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
-            scale: scale(prior.is_some()),
         })
     }
 
     /// Coordinates and functions of directions.
     pub(super) fn places(&self, angles: &[HalfDiff]) -> Places {
         let features = self.prior.as_ref().map(|prior| prior.features(Colour::Achromatic, angles));
-        let x: Vec<f64> = angles.iter().flat_map(|&at| self.space.coordinates(at)).collect();
+        let x = self.space.points(angles);
         Places {
             points: Points::new(&x, &self.kernel.metric),
             count: self.prior.as_ref().map_or(0, |prior| prior.n_functions(Colour::Achromatic)),

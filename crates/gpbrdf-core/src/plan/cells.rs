@@ -5,16 +5,11 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use nalgebra::Vector3;
 
 use crate::base::error::{Error, Result};
+use crate::base::random::quasi_random;
+use crate::brdf::LUMINANCE_WEIGHTS;
 use crate::brdf::angles::{BoxPoint, GRAZING_COSINE, HalfDiff, direction};
 use crate::judge::Environment;
-use crate::judge::sphere::{DistantLight, ENV_PATCHES, environment_lights};
-
-/// Steps of an additive recurrence in three dimensions. Source: M. Roberts, "The Unreasonable Effectiveness of
-/// Quasirandom Sequences" (2018).
-const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_900_4];
-
-/// Luminance of linear sRGB.
-const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+use crate::judge::sphere::{DistantLight, ENV_PATCHES, ShadingFrame, environment_lights};
 
 /// Directions with weights.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +69,7 @@ impl Cells {
         let cumulative: Vec<f64> = lights
             .iter()
             .map(|DistantLight { irradiance, .. }| {
-                total += LUMINANCE.iter().zip(irradiance).map(|(weight, x)| weight * x).sum::<f64>();
+                total += LUMINANCE_WEIGHTS.iter().zip(irradiance).map(|(weight, x)| weight * x).sum::<f64>();
                 total
             })
             .collect();
@@ -89,9 +84,9 @@ impl Cells {
             let normal =
                 Vector3::new(radius * azimuth.cos(), radius * azimuth.sin(), (1.0 - a).max(0.0).sqrt());
             let at = cumulative.partition_point(|sum| *sum <= c * total).min(lights.len() - 1);
-            let light = lights[at].direction;
-            let cosine = light.dot(&normal);
-            (cosine.min(normal.z) > GRAZING_COSINE).then(|| (in_frame(&normal, &light, &viewer), cosine))
+            let (wi, wo) =
+                ShadingFrame::new(&normal, &viewer, GRAZING_COSINE)?.directions(&lights[at].direction)?;
+            Some((HalfDiff::from_directions(&wi, &wo), wi.z))
         });
         Self::new(drawn.take(count).collect())
     }
@@ -116,18 +111,4 @@ impl Cells {
     pub fn is_empty(&self) -> bool {
         self.angles.is_empty()
     }
-}
-
-/// Point `i` of the additive recurrence in the unit cube.
-fn quasi_random(i: usize) -> [f64; 3] {
-    STEPS.map(|step| (0.5 + step * i as f64).fract())
-}
-
-/// The angles of two directions about a unit normal.
-fn in_frame(normal: &Vector3<f64>, light: &Vector3<f64>, viewer: &Vector3<f64>) -> HalfDiff {
-    let axis = if normal.x.abs() < 0.5 { Vector3::x() } else { Vector3::y() };
-    let e = (axis - axis.dot(normal) * normal).normalize();
-    let f = normal.cross(&e);
-    let local = |w: &Vector3<f64>| Vector3::new(w.dot(&e), w.dot(&f), w.dot(normal));
-    HalfDiff::from_directions(&local(light), &local(viewer))
 }

@@ -202,6 +202,11 @@ impl Prior {
         })
     }
 
+    /// This prior with weights of its materials as [`Prior::adapted`]; as it is where there are none.
+    pub(crate) fn weighted(self: &Arc<Self>, weights: &[f64]) -> Result<Arc<Self>> {
+        Ok(if weights.is_empty() { Arc::clone(self) } else { Arc::new(self.adapted(weights)?) })
+    }
+
     /// The space of which its functions are part.
     pub(crate) fn span(&self) -> &Span {
         &self.span

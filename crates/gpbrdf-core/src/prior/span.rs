@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
 use crate::base::linalg::{product_into_slice, view_slice};
+use crate::base::random::quasi_random;
 use crate::brdf::angles::{BoxPoint, HalfDiff};
 use crate::kernel::{Kernel, Points, RowScratch, Shape};
 use crate::sample::InputSpace;
@@ -37,8 +38,7 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// The functions of `count` centres: point `i` of an additive recurrence in the warped box. Source: M. Roberts,
-    /// "The Unreasonable Effectiveness of Quasirandom Sequences" (2018), in three dimensions.
+    /// The functions of `count` centres, the points of an additive recurrence in the warped box.
     ///
     /// # Errors
     /// Fewer than 10 centres, or more than 20,000.
@@ -46,13 +46,12 @@ impl Span {
         if !CENTRES.contains(&count) {
             return Err(Error::argument("centres of a prior", "10 to 20000", count));
         }
-        const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_3, 0.549_700_477_901_900_4];
         let centre = |i: usize| {
-            let [u, v, phi] = STEPS.map(|step| (0.5 + step * i as f64).fract());
+            let [u, v, phi] = quasi_random(i);
             BoxPoint { u, v: LAST_V * v, phi: FRAC_PI_2 * phi }.to_half_diff()
         };
         let centres: Vec<HalfDiff> = (0..count).map(centre).collect();
-        let inputs: Vec<f64> = centres.iter().flat_map(|&at| SPACE.coordinates(at)).collect();
+        let inputs = SPACE.points(&centres);
         let kernel = Kernel::ard(1.0, Shape::Matern52, &LENGTHS);
         let points = Points::new(&inputs, &kernel.metric);
         Ok(Self { centres, inputs, points, kernel })
@@ -79,7 +78,7 @@ impl Span {
     /// Values of several functions without their constants: rows with one value per function. `coefficients` has one
     /// column of `n` per function. Cost: `n` kernel values and `n` multiply-adds per function for each direction.
     pub(crate) fn values(&self, coefficients: &[f64], angles: &[HalfDiff]) -> Vec<f64> {
-        let x: Vec<f64> = angles.iter().flat_map(|&at| SPACE.coordinates(at)).collect();
+        let x = SPACE.points(angles);
         let at = Points::new(&x, &self.kernel.metric);
         let n = self.len();
         let count = coefficients.len() / n;

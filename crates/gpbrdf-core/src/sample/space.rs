@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::base::error::{Error, Result};
@@ -152,6 +153,12 @@ impl InputSpace {
             }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
+    }
+
+    /// Coordinates of many pairs of directions, rows of three, computed in parallel.
+    #[must_use]
+    pub fn points(self, angles: &[HalfDiff]) -> Vec<f64> {
+        angles.par_iter().flat_map_iter(|&at| self.coordinates(at)).collect()
     }
 
     /// Checks the parameters.

@@ -1,8 +1,7 @@
 //! Luminance of colours.
 
-/// Weights of red, green and blue in the luminance of linear sRGB (ITU-R BT.709). `shared/colour.wgsl` has
-/// the same.
-pub(crate) const LUMINANCE_WEIGHTS: [f64; 3] = [0.2126, 0.7152, 0.0722];
+/// `shared/colour.wgsl` has the same.
+pub(crate) use gpbrdf_core::brdf::LUMINANCE_WEIGHTS;
 
 /// Luminance of linear sRGB.
 pub(crate) fn luminance(rgb: &[f32; 3]) -> f64 {

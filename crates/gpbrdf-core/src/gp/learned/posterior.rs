@@ -5,8 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::base::error::{Error, Result};
-use crate::brdf::angles::HalfDiff;
+use crate::base::error::Result;
+use crate::brdf::angles::{HalfDiff, check_finite};
 use crate::gp::dense::row_major;
 use crate::gp::hyper::{Hyper, length_scale_report};
 use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
@@ -91,7 +91,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
             Arc::new(Prior::from_tensors(header, tensors).map_err(|e| tensors.damaged(e))?)
         }
     };
-    let adapted = adapted(&prior, &library_weights).map_err(|e| tensors.damaged(e))?;
+    let adapted = prior.weighted(&library_weights).map_err(|e| tensors.damaged(e))?;
     let mut made = Vec::new();
     for ((name, colour), header) in PARTS.into_iter().zip(Colour::ALL).zip(parts) {
         header.space.validate().map_err(|e| tensors.damaged(e))?;
@@ -107,7 +107,7 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
         let angles: Vec<HalfDiff> =
             rows.iter().map(|&[theta_h, theta_d, phi_d]| HalfDiff { theta_h, theta_d, phi_d }).collect();
         let PartHeader { space, kernel, noise_variance, basis_variance } = header;
-        let points = angles.iter().flat_map(|&at| space.coordinates(at)).collect();
+        let points = space.points(&angles);
         let basis = (adapted.features(colour, &angles), adapted.n_functions(colour), basis_variance);
         let channels = colour.rows().len();
         let gp = ScatteredGp::with_basis(kernel, noise_variance, noise, points, basis, channels, weights);
@@ -117,11 +117,6 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
         Ok(parts) => Ok(Arc::new(LearnedPosterior::new(prior, (library_weights, adapted), parts))),
         Err(_) => Err(tensors.wrong("processes of two kinds of colours", "others")),
     }
-}
-
-/// The prior with these weights of its materials; as it is where there are none.
-pub(super) fn adapted(prior: &Arc<Prior>, weights: &[f64]) -> Result<Arc<Prior>> {
-    Ok(if weights.is_empty() { Arc::clone(prior) } else { Arc::new(prior.adapted(weights)?) })
 }
 
 impl LearnedPosterior {
@@ -147,7 +142,7 @@ impl LearnedPosterior {
     /// The part of the mean that is due to the kernels, and the prior's part.
     fn means(&self, angles: &[HalfDiff]) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
         let [bright, coloured] =
-            self.parts.each_ref().map(|part| part.gp.mean_at(&points(part.space, angles)));
+            self.parts.each_ref().map(|part| part.gp.mean_at(&part.space.points(angles)));
         let trend = self.prior.span().values(&self.trend, angles);
         (0..bright.len()).map(move |i| {
             let own = from_opponent([bright[i], coloured[2 * i], coloured[2 * i + 1]]);
@@ -189,10 +184,6 @@ impl Moments {
     }
 }
 
-fn points(space: InputSpace, angles: &[HalfDiff]) -> Vec<f64> {
-    angles.iter().flat_map(|&angles| space.coordinates(angles)).collect()
-}
-
 impl Posterior for LearnedPosterior {
     fn solver(&self) -> &'static str {
         NAME
@@ -230,12 +221,10 @@ impl Posterior for LearnedPosterior {
     }
 
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
-        if let Some(bad) = angles.iter().find(|angles| !angles.is_finite()) {
-            return Err(Error::argument("angles", "finite numbers", format!("{bad:?}")));
-        }
+        check_finite(angles)?;
         let [bright, coloured] = Colour::ALL.map(|colour| {
             let Part { gp, space, .. } = &self.parts[colour as usize];
-            gp.variance_at(&points(*space, angles), &self.adapted.features(colour, angles))
+            gp.variance_at(&space.points(angles), &self.adapted.features(colour, angles))
         });
         let (bright, coloured) = (bright?, coloured?);
         Ok(bright.into_iter().zip(coloured).map(|(a, c)| variance_of_channels(a, c)).collect())

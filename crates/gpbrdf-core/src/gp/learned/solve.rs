@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::posterior::{LearnedPosterior, Part, adapted};
+use super::posterior::{LearnedPosterior, Part};
 use crate::base::error::{Error, Result};
 use crate::base::linalg::{factorize, solve_lower};
 use crate::base::simd::dot;
@@ -30,17 +30,19 @@ const MOST_COMPARED: usize = 512;
 /// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
 /// that the samples resemble.
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
-    let fit_colour = |prior: &Prior, colour: Colour, space| {
+    // Three fits of about the same length.
+    let fit_colour = |nth: f64, prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
-        fit_process(&Problem { space, ..of_colour(problem, prior, colour, &features) })
+        let watch = &problem.watch.part(nth / 3.0, (nth + 1.0) / 3.0);
+        fit_process(&Problem { space, watch, ..of_colour(problem, prior, colour, &features) })
     };
-    let (first, first_report) = fit_colour(prior, Colour::Achromatic, problem.space)?;
+    let (first, first_report) = fit_colour(0.0, prior, Colour::Achromatic, problem.space)?;
     let weights = library_weights(problem, prior, &first)?;
-    let adapted = adapted(prior, &weights)?;
-    let (bright, mut bright_report) = fit_colour(&adapted, Colour::Achromatic, Some(first.space))?;
+    let adapted = prior.weighted(&weights)?;
+    let (bright, mut bright_report) = fit_colour(1.0, &adapted, Colour::Achromatic, Some(first.space))?;
     bright_report.evaluations += first_report.evaluations;
     // The chromatic colours take the space of the achromatic one.
-    let (coloured, coloured_report) = fit_colour(&adapted, Colour::Chromatic, Some(bright.space))?;
+    let (coloured, coloured_report) = fit_colour(2.0, &adapted, Colour::Chromatic, Some(bright.space))?;
     let posterior = posterior(problem, prior, (weights, adapted), vec![bright, coloured])?;
     Ok((posterior, combined(&[bright_report, coloured_report])))
 }
@@ -69,13 +71,11 @@ fn library_weights(problem: &Problem<'_>, prior: &Prior, found: &Conditioned) ->
     if !factorize(&mut factor, n) {
         return Ok(Vec::new());
     }
-    let y = &problem.targets;
     let log_likelihoods: Vec<f64> = prior
         .scores()
         .map(|z| {
             let rest = |(k, &i): (usize, &usize)| {
-                let target = to_opponent([y[0][i], y[1][i], y[2][i]])[0];
-                target - mean[k] - dot(&features[k * count..(k + 1) * count], z)
+                colours_of(problem, i)[0] - mean[k] - dot(&features[k * count..(k + 1) * count], z)
             };
             let mut white: Vec<f64> = some.iter().enumerate().map(rest).collect();
             solve_lower(&factor, n, &mut white);
@@ -118,7 +118,7 @@ pub(crate) fn condition(
     let Some(chromatic) = &hyper.chromatic else {
         return Err(Error::argument("hyper-parameters", "those of a fit with a learned prior", "others"));
     };
-    let adapted = adapted(prior, &hyper.library_weights)?;
+    let adapted = prior.weighted(&hyper.library_weights)?;
     let (mut found, mut value) = (Vec::new(), 0.0);
     for (colour, hyper) in Colour::ALL.into_iter().zip([hyper, chromatic]) {
         let features = adapted.features(colour, problem.angles);
@@ -129,16 +129,17 @@ pub(crate) fn condition(
     Ok((posterior(problem, prior, (hyper.library_weights.clone(), adapted), found)?, value))
 }
 
+/// The three colours of the targets of sample `i`.
+fn colours_of(problem: &Problem<'_>, i: usize) -> [f64; 3] {
+    to_opponent(std::array::from_fn(|channel| problem.targets[channel][i]))
+}
+
 /// The problem of one kind of colour.
 fn of_colour<'a>(problem: &Problem<'a>, prior: &Prior, colour: Colour, features: &'a [f64]) -> Problem<'a> {
     let mean = prior.mean(colour, problem.angles);
-    let y = &problem.targets;
-    let targets = colour.rows().map(|row| {
-        mean.iter()
-            .enumerate()
-            .map(|(i, mean)| to_opponent([y[0][i], y[1][i], y[2][i]])[row] - mean)
-            .collect()
-    });
+    let targets = colour
+        .rows()
+        .map(|row| mean.iter().enumerate().map(|(i, mean)| colours_of(problem, i)[row] - mean).collect());
     Problem {
         targets: targets.collect(),
         usual_variance: None,

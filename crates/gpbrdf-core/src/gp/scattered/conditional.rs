@@ -1,7 +1,7 @@
 //! The distribution of one sample given a few others: the building block of the nearest-neighbour likelihood,
 //! of the preconditioner, of variances and of leave-one-out predictions.
 
-use crate::base::simd::dot;
+use crate::base::simd::{add_scaled, dot};
 use crate::kernel::Kernel;
 
 /// Functions `b` that add `v b(x)^T b(x')` to a covariance, by their values at the samples. There may be none.
@@ -17,6 +17,15 @@ impl Basis {
     /// The values at sample `i`.
     pub(super) fn row(&self, i: usize) -> &[f64] {
         &self.rows[i * self.count..(i + 1) * self.count]
+    }
+
+    /// `scale sum_i weights_i b(x_i)`.
+    pub(super) fn weighted_sum(&self, scale: f64, weights: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.count];
+        for (i, weight) in weights.iter().enumerate() {
+            add_scaled(scale * weight, self.row(i), &mut sum);
+        }
+        sum
     }
 }
 

@@ -13,7 +13,7 @@ use super::product::Covariance;
 use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp};
 use crate::base::error::Result;
-use crate::base::simd::{add_scaled, dot};
+use crate::base::simd::dot;
 use crate::base::watch::Watch;
 use crate::gp::problem::{BasisTerm, Outliers, Problem};
 use crate::gp::report::FitReport;
@@ -395,13 +395,7 @@ impl State {
     pub(super) fn basis_coefficients(&self, data: &Data) -> Result<Vec<Vec<f64>>> {
         let (_, all) = data.noise(self.noise_variance, &self.weights);
         let weights = exact::weights(&self.process(data, &all), &data.y)?;
-        let of_channel = |weights: &[f64]| {
-            let mut sum = vec![0.0; data.basis.count];
-            for (i, weight) in weights.iter().enumerate() {
-                add_scaled(self.basis_variance * weight, data.basis.row(i), &mut sum);
-            }
-            sum
-        };
+        let of_channel = |weights: &[f64]| data.basis.weighted_sum(self.basis_variance, weights);
         Ok(weights.chunks(data.len().max(1)).map(of_channel).collect())
     }
 

@@ -32,7 +32,6 @@ use self::conditional::{Basis, Process, Scratch};
 use self::neighbours::Embedded;
 use self::preconditioner::{FarField, Preconditioner};
 use crate::base::error::{Error, Result};
-use crate::base::simd::add_scaled;
 use crate::base::watch::Watch;
 use crate::kernel::{Kernel, Points};
 
@@ -167,11 +166,7 @@ impl ScatteredGp {
     /// The coefficients of the basis in the posterior mean of a channel, `v sum_i alpha_i b(x_i)`.
     pub(crate) fn basis_coefficients(&self, channel: usize) -> Vec<f64> {
         let n = self.n_samples();
-        let mut sum = vec![0.0; self.basis.count];
-        for (i, weight) in self.weights[channel * n..(channel + 1) * n].iter().enumerate() {
-            add_scaled(self.basis_variance * weight, self.basis.row(i), &mut sum);
-        }
-        sum
+        self.basis.weighted_sum(self.basis_variance, &self.weights[channel * n..(channel + 1) * n])
     }
 
     /// Takes what variances need from the search for the weights.

@@ -2,14 +2,13 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::ScatteredGp;
 use super::conditional::Basis;
-use crate::base::error::{Error, Result};
-use crate::brdf::angles::HalfDiff;
+use crate::base::error::Result;
+use crate::brdf::angles::{HalfDiff, check_finite};
 use crate::gp::dense::row_major;
 use crate::gp::hyper::{Hyper, length_scale_report};
 use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
@@ -49,12 +48,6 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
     Ok(Arc::new(ScatteredPosterior { gp: gp.map_err(|e| tensors.damaged(e))?, space }))
 }
 
-impl ScatteredPosterior {
-    fn points(&self, angles: &[HalfDiff]) -> Vec<f64> {
-        angles.par_iter().flat_map_iter(|&angles| self.space.coordinates(angles)).collect()
-    }
-}
-
 impl Posterior for ScatteredPosterior {
     fn solver(&self) -> &'static str {
         NAME
@@ -85,14 +78,12 @@ impl Posterior for ScatteredPosterior {
     }
 
     fn predict_mean(&self, angles: &[HalfDiff]) -> Vec<f64> {
-        self.gp.mean_at(&self.points(angles))
+        self.gp.mean_at(&self.space.points(angles))
     }
 
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
-        match angles.iter().find(|angles| !angles.is_finite()) {
-            Some(bad) => Err(Error::argument("angles", "finite numbers", format!("{bad:?}"))),
-            None => self.gp.variance_at(&self.points(angles), &[]),
-        }
+        check_finite(angles)?;
+        self.gp.variance_at(&self.space.points(angles), &[])
     }
 
     fn hyper(&self) -> Option<Hyper> {

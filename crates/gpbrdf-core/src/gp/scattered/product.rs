@@ -76,10 +76,7 @@ impl Covariance<'_> {
         }
         if self.basis.count > 0 {
             for (x, out) in x.chunks(n).zip(out.chunks_mut(n)) {
-                let mut sum = vec![0.0; self.basis.count];
-                x.iter()
-                    .enumerate()
-                    .for_each(|(i, &x)| add_scaled(self.basis_variance * x, self.basis.row(i), &mut sum));
+                let sum = self.basis.weighted_sum(self.basis_variance, x);
                 out.iter_mut().enumerate().for_each(|(i, out)| *out += dot(self.basis.row(i), &sum));
             }
         }

@@ -101,7 +101,12 @@ fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Foun
     let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();
     let rows: Vec<f64> = some.iter().flat_map(|&i| row(i)).copied().collect();
     let known_noise = pick(problem.known_noise);
+    let halves = [(0.0, 0.5), (0.5, 1.0)].map(|(from, to)| {
+        let end = left_out_share(problem);
+        problem.watch.part(from * end, to * end)
+    });
     let few = search(&Problem {
+        watch: &halves[0],
         angles: &angles,
         targets: problem.targets.iter().map(|y| pick(y)).collect(),
         known_noise: &known_noise,
@@ -113,6 +118,7 @@ fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Foun
         |(y, z): (&Vec<f64>, &Vec<f64>)| y.iter().enumerate().map(|(i, y)| y - dot(row(i), z)).collect();
     let in_plane = few.space == InputSpace::PlaneOfIncidence;
     let rest = search(&Problem {
+        watch: &halves[1],
         targets: problem.targets.iter().zip(&coefficients).map(left).collect(),
         space: if in_plane { Some(few.space) } else { problem.space },
         basis: None,
