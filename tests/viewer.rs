@@ -3,6 +3,7 @@
 
 mod viewer {
     mod controls;
+    mod directions;
     mod driver;
     mod files;
     mod model;

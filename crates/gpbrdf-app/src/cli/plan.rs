@@ -9,10 +9,8 @@ use clap::{Args, ValueEnum};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::base::number::significant;
 use gpbrdf_core::formats::read_environment;
-use gpbrdf_core::model::PriorChoice;
 use gpbrdf_core::plan::{
-    AxisCosts, Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, MOST_MEASURED, Plan as Planned, plan,
-    tour,
+    AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, MOST_MEASURED, Plan as Planned, plan, tour,
 };
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Content, FitOptions, HalfDiff, fit};
@@ -20,7 +18,7 @@ use gpbrdf_core::{Content, FitOptions, HalfDiff, fit};
 use super::input::{environment, open};
 use super::reading::Reading;
 use super::terminal::Terminal;
-use crate::job::{Observer, PriorName};
+use crate::job::{Observer, PriorName, expected_errors, plan_csv};
 use crate::output::OutputFolder;
 use crate::reproduce::{BATCHES, Simulation, Trial};
 
@@ -182,7 +180,7 @@ impl Plan {
             environment: &environment,
             device: &self.instrument.device(),
             cells: &self.cells()?,
-            prior: prior(self.prior.open()?),
+            prior: self.prior.prior()?,
         };
         let found = terminal.stage("Simulating", || Simulation::new(&source.name, &trial, &batches))?;
         if self.simulation.json {
@@ -251,9 +249,8 @@ impl Plan {
 
     /// Reads what was measured and fits a model to it.
     fn known(&self, terminal: &Terminal) -> Result<Known> {
-        let choice = self.prior.open()?;
         let Some(path) = &self.measured else {
-            let prior = prior(choice);
+            let prior = self.prior.prior()?;
             let belief = Belief::before(prior.as_ref());
             return Ok(Known {
                 belief,
@@ -277,7 +274,7 @@ impl Plan {
                 samples.len()
             ));
         }
-        let options = FitOptions { prior: choice, ..FitOptions::default() };
+        let options = FitOptions { prior: self.prior.open()?, ..FitOptions::default() };
         let fitted = terminal.stage("Fitting", || anyhow::Ok(fit(samples, &options)?))?;
         let Some(hyper) = fitted.model.hyper() else {
             bail!("--measured {}: expected a model with hyper-parameters, found none", source.origin());
@@ -295,15 +292,10 @@ impl Plan {
 
     /// The file.
     fn text(&self, found: &Planned, known: &Known, device: &Device, costs: &AxisCosts) -> String {
-        let Planned { geometries, errors } = found;
+        let geometries = &found.geometries;
         let count = geometries.len();
         let rank: Vec<usize> = (0..count).collect();
         let order = if self.order == Order::Rank { rank.clone() } else { tour(geometries, costs) };
-        let mut marks: Vec<usize> =
-            [5, 10, 20, 50, 100, 200, 500].into_iter().filter(|&m| m < count).collect();
-        marks.push(count);
-        let after = marks.iter().map(|&m| format!("{} after {m}", significant(errors[m], 3)));
-        let after: Vec<String> = after.collect();
         let cost = |order: &[usize]| significant(costs.of_way(geometries, order), 4);
         let order_said = match self.order {
             Order::Rank => "the most telling first".to_owned(),
@@ -319,45 +311,17 @@ impl Plan {
                 format!("a sphere in the light of {}", path.display()).replace(char::is_control, " ")
             }
         };
-        let mut text = String::new();
-        for line in [
+        let comments = [
             format!("{count} directions to measure, by gpbrdf-cli {}", env!("CARGO_PKG_VERSION")),
             format!("instrument: {device}"),
             format!("measured: {}", known.measured),
             format!("prior: {}", known.prior),
             format!("what counts: {lit}"),
-            format!(
-                "expected error of ln f by rank: {} now, {}",
-                significant(errors[0], 3),
-                after.join(", ")
-            ),
+            expected_errors(found),
             format!("order: {order_said}"),
-            "add a column value, or r, g and b, with f in 1/sr for each row".to_owned(),
-        ] {
-            text.push_str(&format!("# {line}\n"));
-        }
-        text.push_str("theta_i,phi_i,theta_o,phi_o\n");
-        for i in order {
-            let Geometry { theta_i, theta_o, phi_o } = geometries[i];
-            let [theta_i, theta_o, phi_o] = [theta_i, theta_o, phi_o].map(rounded);
-            text.push_str(&format!("{theta_i},0,{theta_o},{phi_o}\n"));
-        }
-        text
+        ];
+        plan_csv(&comments, order.into_iter().map(|i| &geometries[i]))
     }
-}
-
-/// The prior that was chosen.
-fn prior(choice: PriorChoice) -> Option<Arc<Prior>> {
-    match choice {
-        PriorChoice::BuiltIn => Some(Prior::built_in()),
-        PriorChoice::None => None,
-        PriorChoice::Learned(prior) => Some(prior),
-    }
-}
-
-/// A multiple of a step without what rounding has added.
-fn rounded(degrees: f64) -> f64 {
-    (degrees * 1e9).round() / 1e9
 }
 
 fn described(prior: Option<Arc<Prior>>) -> String {

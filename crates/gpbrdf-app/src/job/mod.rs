@@ -21,6 +21,7 @@ mod forecast;
 mod hyper;
 mod judge;
 mod kernels;
+mod plan_file;
 mod prior;
 mod report;
 mod run;
@@ -35,6 +36,7 @@ pub(crate) use forecast::{remaining, samples_within};
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
+pub(crate) use plan_file::{expected_errors, plan_csv};
 pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]

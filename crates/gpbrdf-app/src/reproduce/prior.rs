@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use gpbrdf_core::brdf::Brdf;
 use gpbrdf_core::plan::{Belief, Cells, Device, Goal, MOST_CANDIDATES, plan};
-use gpbrdf_core::prior::{LearnOptions, Library, learn};
+use gpbrdf_core::prior::{LearnOptions, Library, family, learn};
 use gpbrdf_core::{BrdfTable, Metrics};
 use serde_json::{Value, json};
 
@@ -53,11 +53,6 @@ impl Materials {
         self.principal.add(name, brdf);
         Ok(())
     }
-}
-
-/// The first word of a name.
-fn family(name: &str) -> &str {
-    name.split('_').next().unwrap_or(name)
 }
 
 /// A row of the table of all materials.

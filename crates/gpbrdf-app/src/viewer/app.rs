@@ -26,6 +26,7 @@ use super::work::dialogs::{self, Access, Question};
 use super::work::export::{self, Saved};
 use super::work::fitter::{self, Fitter, News, Report};
 use super::work::outbox::{Outbox, Waker};
+use super::work::watcher::Watcher;
 
 /// A source that has been read, with what a session says about it.
 #[derive(Debug)]
@@ -49,6 +50,10 @@ enum Event {
     Open(PathBuf),
     /// Write the session to this file.
     SaveSession(PathBuf),
+    /// An open file of measurements has changed.
+    Changed(PathBuf),
+    /// It has been read again, or not.
+    Reread(PathBuf, Result<Arc<Source>, String>),
 }
 
 /// How long the window's own work takes.
@@ -69,6 +74,7 @@ pub struct Viewer {
     panes: Vec<Box<dyn Pane>>,
     windows: Windows,
     fitter: Fitter,
+    watcher: Watcher,
     outbox: Outbox<Event>,
     events: Receiver<Event>,
     wake: Waker,
@@ -131,6 +137,7 @@ impl Viewer {
         let wake: Waker = Arc::new(move || repaint.request_repaint());
         let (outbox, events) = Outbox::channel(&wake);
         let fitter = Fitter::new(outbox.map(Event::Fit))?;
+        let watcher = Watcher::new(outbox.map(Event::Changed))?;
         let start = Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()) };
         let open = Question {
             title: "Open materials",
@@ -160,6 +167,7 @@ impl Viewer {
             panes: panes::all(&start)?,
             windows: Windows::new(open),
             fitter,
+            watcher,
             outbox,
             events,
             wake,
@@ -308,6 +316,8 @@ impl Viewer {
                 Event::Browsed((question, paths)) => self.answer(&question, paths),
                 Event::Open(path) => self.open_paths(&[path]),
                 Event::SaveSession(path) => self.save_session(&path),
+                Event::Changed(path) => self.reread(path),
+                Event::Reread(path, result) => self.renew(&path, result),
             }
         }
         for pane in &mut self.panes {
@@ -420,6 +430,8 @@ impl Viewer {
         for pane in &mut self.panes {
             pane.request(&mut self.context);
         }
+        let watched = self.context.documents.iter().filter(|d| self.settings.watch && d.is_scattered());
+        self.watcher.watch(watched.filter_map(|document| document.source.path.clone()).collect());
     }
 
     /// The whole window.

@@ -29,6 +29,10 @@ pub use state::settings::Settings;
 struct Arguments {
     /// Materials, models and sessions to open: files, or names of built-in materials.
     files: Vec<PathBuf>,
+    /// Whether open files of measurements are read again when they change, so that a measurement that is added to one is
+    /// fitted at once.
+    #[arg(long, value_name = "true|false", default_value_t = true, action = clap::ArgAction::Set)]
+    watch: bool,
 }
 
 /// The viewer in a window of eframe.
@@ -76,11 +80,11 @@ const SOON: Duration = Duration::from_secs(5);
 /// Runs the program in a window, and in another one with what was open when the graphics device is lost.
 #[must_use]
 pub fn main() -> ExitCode {
-    let files = Arguments::parse().files;
+    let arguments = Arguments::parse();
     let kept = Rc::new(RefCell::new(None));
     loop {
         let start = Instant::now();
-        if let Err(error) = run(&files, &kept) {
+        if let Err(error) = run(&arguments, &kept) {
             eprintln!("error: cannot open a window: {error}");
             return ExitCode::FAILURE;
         }
@@ -95,7 +99,7 @@ pub fn main() -> ExitCode {
 
 /// One window, until it is closed. It goes on with the viewer in `kept`, and leaves its own there when its
 /// device is lost.
-fn run(files: &[PathBuf], kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result {
+fn run(arguments: &Arguments, kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("gpbrdf viewer")
         .with_app_id("gpbrdf-viewer")
@@ -107,7 +111,10 @@ fn run(files: &[PathBuf], kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Result 
         let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
         let viewer = match kept.borrow_mut().take() {
             Some(old) => Viewer::reopened(&creation.egui_ctx, old)?,
-            None => Viewer::new(&creation.egui_ctx, settings, files)?,
+            None => {
+                let settings = Settings { watch: arguments.watch, ..settings };
+                Viewer::new(&creation.egui_ctx, settings, &arguments.files)?
+            }
         };
         if let Some(state) = &creation.wgpu_render_state {
             viewer.watch_device(state);

@@ -10,11 +10,16 @@ use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, S
 /// factor of 10 or so.
 const NOISE_PRIOR: (f64, f64) = (2.5e-5, 2.5);
 
+/// The prior of the noise variance of `ln f` where basis functions are learned: measurements are usually good to 1 %,
+/// within a factor of 3 or so. It is tighter than the other since a few samples of a highlight that is sharper than any
+/// of the library look like noise.
+const NOISE_PRIOR_OF_LOG: (f64, f64) = (1e-4, 1.0);
+
 /// Standard deviation of the logarithm of a signal variance about the usual variance of targets.
 const VARIANCE_DEVIATION: f64 = 1.2;
 
 /// The prior of the variance of basis functions: they come with variances of their own, so it is about 1.
-const BASIS_PRIOR: (f64, f64) = (1.0, 0.6);
+const BASIS_PRIOR: (f64, f64) = (1.0, 0.3);
 
 /// The least and the largest variance of basis functions.
 const BASIS_RANGE: (f64, f64) = (1e-3, 1e2);
@@ -41,8 +46,8 @@ pub(crate) struct SearchStart {
     has_basis: bool,
     /// The usual variance of what the kernel describes, or the mean square of the targets.
     variance: f64,
-    /// The usual noise variance.
-    noise_variance: f64,
+    /// The prior of the noise variance.
+    noise_prior: (f64, f64),
 }
 
 /// The hyper-parameters beside those of a kernel.
@@ -80,14 +85,15 @@ impl SearchStart {
             });
         }
         let variance = usual_variance.unwrap_or(variance);
-        let noise_variance = NOISE_PRIOR.0 * variance;
-        Self { kernel, parameters, noise, has_basis: false, variance, noise_variance }
+        let noise_prior = (NOISE_PRIOR.0 * variance, NOISE_PRIOR.1);
+        Self { kernel, parameters, noise, has_basis: false, variance, noise_prior }
     }
 
-    /// Adds the variance of basis functions to the parameters. The kernel describes what the functions leave, which
+    /// Adds the variance of learned basis functions of `ln f` to the parameters. The kernel describes what they leave, which
     /// usually has the standard deviation `left`.
     pub(crate) fn with_basis(mut self, left: f64) -> Self {
         self.variance = left * left;
+        self.noise_prior = NOISE_PRIOR_OF_LOG;
         let kinds = self.kernel.parameter_kinds();
         let share = self.variance / self.kernel.terms.len() as f64;
         for (parameter, kind) in self.parameters.iter_mut().zip(&kinds) {
@@ -111,7 +117,7 @@ impl SearchStart {
     }
 
     /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the usual
-    /// variance of targets, of the noise variance about 2.5e-5 of it. What the samples determine they hardly change;
+    /// variance of targets, of the noise variance about 2.5e-5 of it (1e-4 with a basis). What the samples determine they hardly change;
     /// what the samples leave open they decide.
     pub(crate) fn with_priors(mut self, usual_lengths: [(f64, f64); 3]) -> Self {
         let terms = self.kernel.terms.len() as f64;
@@ -123,7 +129,7 @@ impl SearchStart {
                 Some(ParameterKind::Alpha) => ALPHA_PRIOR,
                 Some(ParameterKind::Weight) => (1.0, VARIANCE_DEVIATION),
                 None if self.has_basis && k == kinds.len() => BASIS_PRIOR,
-                None => (self.noise_variance, NOISE_PRIOR.1),
+                None => self.noise_prior,
             };
             let prior = LogNormal::new(median, deviation);
             parameter.prior = Some(prior);

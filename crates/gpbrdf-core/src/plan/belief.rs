@@ -82,6 +82,12 @@ impl Belief {
         })
     }
 
+    /// The factors by which variances at directions are larger than the process says: those of the intervals of a fit.
+    pub(super) fn calibration(&self, angles: &[HalfDiff]) -> Vec<f64> {
+        let factor = |at| self.prior.as_ref().map_or(1.0, |prior| prior.calibration().of_variance(at));
+        angles.iter().map(factor).collect()
+    }
+
     /// Coordinates and functions of directions.
     pub(super) fn places(&self, angles: &[HalfDiff]) -> Places {
         let features = self.prior.as_ref().map(|prior| prior.features(Colour::Achromatic, angles));

@@ -116,7 +116,8 @@ pub fn expected_error(belief: &Belief, measured: &[HalfDiff], cells: &Cells) -> 
 /// The covariance given measurements and choices.
 struct State<'a> {
     belief: &'a Belief,
-    weights: &'a [f64],
+    /// Weights of the cells, times what the variance of each is larger than the process says.
+    weights: Vec<f64>,
     places: Places,
     /// Covariance of cells and candidates, one column of cells per candidate.
     covariance: Vec<f64>,
@@ -173,20 +174,12 @@ impl<'a> State<'a> {
             });
             taken = from_candidates.chunks(n).map(<[f64]>::to_vec).collect();
         }
+        let calibration = belief.calibration(&cells.angles);
+        let weights: Vec<f64> = cells.weights.iter().zip(calibration).map(|(w, factor)| w * factor).collect();
         let scores =
-            covariance.par_chunks(cells.len()).map(|column| dot3(&cells.weights, column, column)).collect();
+            covariance.par_chunks(cells.len()).map(|column| dot3(&weights, column, column)).collect();
         let is_chosen = vec![false; candidates.len()];
-        Ok(Self {
-            belief,
-            weights: &cells.weights,
-            places,
-            covariance,
-            of_cells,
-            of_candidates,
-            taken,
-            scores,
-            is_chosen,
-        })
+        Ok(Self { belief, weights, places, covariance, of_cells, of_candidates, taken, scores, is_chosen })
     }
 
     /// The expected error.
@@ -215,7 +208,7 @@ impl<'a> State<'a> {
         let deviation = (self.of_candidates[j].max(0.0) + self.belief.noise_variance).sqrt();
         let step: Vec<f64> =
             self.covariance[j * cells..(j + 1) * cells].iter().map(|c| c / deviation).collect();
-        let weights = self.weights;
+        let weights = &self.weights;
         let prior = self.belief.column(&self.places, &self.places, j);
         let own = self.taken[j].clone();
         self.covariance

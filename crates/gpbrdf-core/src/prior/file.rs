@@ -5,7 +5,7 @@ use std::path::Path;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::{Functions, Prior, Span};
+use super::{Calibration, Functions, Prior, Span};
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::base::tensor_file;
@@ -19,7 +19,7 @@ pub(super) const BUILT_IN: &[u8] = include_bytes!("../../assets/prior.safetensor
 const KEY: &str = "gpbrdf_prior";
 
 /// The version of the format that is written, and the only one that is read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// What is not a tensor.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -27,6 +27,7 @@ pub(crate) struct PriorHeader {
     version: u32,
     name: String,
     left: [f64; 2],
+    calibration: [f64; 4],
     materials: Vec<String>,
 }
 
@@ -72,6 +73,7 @@ impl Prior {
             version: VERSION,
             name: self.name.clone(),
             left: self.left,
+            calibration: self.calibration.factors(),
             materials: self.materials.clone(),
         }
     }
@@ -121,7 +123,8 @@ impl Prior {
         };
         let [bright, coloured] = [read(NAMES[1])?, read(NAMES[2])?].map(functions);
         let names = (header.name, header.materials);
-        Self::new(names, span, functions(mean)?, [bright?, coloured?], header.left, read(NAMES[3])?)
+        let (mean, functions, scores) = (functions(mean)?, [bright?, coloured?], read(NAMES[3])?);
+        Self::new(names, span, mean, functions, header.left, scores, Calibration::new(header.calibration)?)
     }
 
     /// Reads a prior.

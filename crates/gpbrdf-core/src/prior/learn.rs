@@ -2,7 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::colour::{Colour, to_opponent};
+use super::calibration::Calibration;
+use super::colour::{Colour, from_opponent, to_opponent};
+use super::cross_validation::{FOLDS, calibration, folds};
 use super::span::{SPACE, Span};
 use super::{Functions, Prior};
 use crate::base::error::{Error, Result};
@@ -24,9 +26,6 @@ const SEED: u64 = 7;
 /// The variance of what the functions of a span leave of a material, relative to that of their kernel.
 const NOISE: f64 = 2e-4;
 
-/// The number of parts of the library that are left out in turn to see what the functions leave.
-const FOLDS: usize = 8;
-
 /// Size of a prior.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LearnOptions {
@@ -46,7 +45,7 @@ pub struct Library {
     span: Span,
     /// Cholesky factor of the covariance at the centres.
     factor: Vec<f64>,
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     colours: Vec<[Member; 3]>,
 }
 
@@ -145,6 +144,18 @@ impl Library {
         Ok(())
     }
 
+    /// The values of material `i` at any directions, sr^-1.
+    pub(super) fn values_at(&self, i: usize, angles: &[HalfDiff]) -> Vec<Rgb> {
+        let coefficients: Vec<f64> =
+            self.colours[i].iter().flat_map(|member| &member.coefficients).copied().collect();
+        let constants = self.colours[i].each_ref().map(|member| member.constant);
+        let values = self.span.values(&coefficients, angles);
+        let rgb = |row: &[f64]| {
+            from_opponent(std::array::from_fn(|c| constants[c] + row[c])).map(|y| Prior::TRANSFORM.inverse(y))
+        };
+        values.chunks(3).map(rgb).collect()
+    }
+
     /// The names of the materials.
     #[must_use]
     pub fn names(&self) -> &[String] {
@@ -154,10 +165,15 @@ impl Library {
     /// The library without the materials whose names `leave` picks.
     #[must_use]
     pub fn without(&self, leave: impl Fn(&str) -> bool) -> Self {
-        let kept = || self.names.iter().zip(&self.colours).filter(|(name, _)| !leave(name));
+        self.without_places(|i| leave(&self.names[i]))
+    }
+
+    /// The library without the materials at the places that `leave` picks.
+    pub(super) fn without_places(&self, leave: impl Fn(usize) -> bool) -> Self {
+        let kept = || (0..self.names.len()).filter(|i| !leave(*i));
         Self {
-            names: kept().map(|(name, _)| name.clone()).collect(),
-            colours: kept().map(|(_, colours)| colours.clone()).collect(),
+            names: kept().map(|i| self.names[i].clone()).collect(),
+            colours: kept().map(|i| self.colours[i].clone()).collect(),
             span: self.span.clone(),
             factor: self.factor.clone(),
         }
@@ -169,12 +185,26 @@ impl Library {
 /// equally likely in advance; since they rotate the chromatic colours into each other, this changes no function.
 ///
 /// What the functions leave of unknown materials is measured on the library itself, of which one eighth at a time is
-/// left out. Cost: `O(m^2 n)` for `m` materials known at `n` directions. Numbers are rounded to single precision, as in
-/// files.
+/// left out, and so is how much wider intervals must be than the process says; materials whose names begin with the same
+/// word ([`family`]) are left out together. Cost: `O(m^2 n)` for `m` materials known at `n` directions, and two fits of
+/// few samples for each of at most 48 materials. Numbers are rounded to single precision, as in files.
 ///
 /// # Errors
 /// Fewer than two materials.
 pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Prior> {
+    let prior = learn_functions(name, library, options)?;
+    Ok(Prior { calibration: calibration(library, options)?, ..prior })
+}
+
+/// The first word of the name of a material, up to the first `_`, `-` or blank: materials of which it is the same are
+/// taken as of one family.
+#[must_use]
+pub fn family(name: &str) -> &str {
+    name.split(['_', '-', ' ']).next().unwrap_or(name)
+}
+
+/// [`learn`] without a calibration of intervals.
+pub(super) fn learn_functions(name: &str, library: &Library, options: &LearnOptions) -> Result<Prior> {
     let count = library.names.len();
     if count < 2 {
         return Err(Error::argument("materials of a library", "at least 2", count));
@@ -182,6 +212,7 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
     let n = library.span.len();
     let mut mean = Member { values: vec![0.0; n], constant: 0.0, coefficients: vec![0.0; n] };
     library.colours.iter().for_each(|[bright, ..]| mean.add(1.0 / count as f64, bright));
+    let folds = folds(&library.names);
     let (mut left, mut scores) = ([0.0; 2], Vec::new());
     let functions = Colour::ALL.map(|colour| {
         let wanted = options.functions[colour as usize];
@@ -198,7 +229,7 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
             })
             .collect();
         // What functions of other materials leave of a material is part of what is expected of an unknown one.
-        let (rests, rest) = what_is_left(&groups, wanted);
+        let (rests, rest) = what_is_left(&groups, &folds, wanted);
         left[colour as usize] = rest;
         let members: Vec<&Member> = groups.iter().flatten().collect();
         let deviations = members.len() as f64;
@@ -219,7 +250,8 @@ pub fn learn(name: &str, library: &Library, options: &LearnOptions) -> Result<Pr
         constants: vec![rounded(mean.constant)],
         coefficients: mean.coefficients.into_iter().map(rounded).collect(),
     };
-    Prior::new((name.to_owned(), library.names.clone()), library.span.clone(), mean, functions, left, scores)
+    let names = (name.to_owned(), library.names.clone());
+    Prior::new(names, library.span.clone(), mean, functions, left, scores, Calibration::NONE)
 }
 
 /// The nearest number in single precision.
@@ -260,17 +292,15 @@ fn principal_functions(members: &[&Member], divisor: f64, count: usize) -> Vec<M
     .collect()
 }
 
-/// What the functions of the other groups leave of each member, one part of the groups at a time, and its root mean
-/// square over the centres.
-fn what_is_left(groups: &[Vec<Member>], count: usize) -> (Vec<Member>, f64) {
-    let folds = FOLDS.min(groups.len());
-    let rests: Vec<Member> = (0..folds)
+/// What the functions of the other groups leave of each member, one fold of the groups at a time, and its root mean
+/// square over the centres. `folds` has the fold of each group.
+fn what_is_left(groups: &[Vec<Member>], folds: &[usize], count: usize) -> (Vec<Member>, f64) {
+    let rests: Vec<Member> = (0..FOLDS)
         .into_par_iter()
         .flat_map_iter(|fold| {
-            let own = |i: usize| i % folds == fold;
             let group = |inside: bool| {
-                let groups = groups.iter().enumerate().filter(move |(i, _)| own(*i) == inside);
-                groups.flat_map(|(_, group)| group)
+                let groups = groups.iter().zip(folds).filter(move |(_, own)| (**own == fold) == inside);
+                groups.flat_map(|(group, _)| group)
             };
             let others: Vec<&Member> = group(false).collect();
             let divisor = others.len() as f64;

@@ -1,19 +1,23 @@
 //! What other materials tell about a material that is measured: the mean and the principal functions of a library
 //! of reflectances.
 
+mod calibration;
 mod colour;
+#[cfg(feature = "fit")]
+mod cross_validation;
 mod file;
 #[cfg(feature = "fit")]
 mod learn;
 mod span;
 
+pub(crate) use calibration::Calibration;
 pub use colour::Colour;
 #[cfg(feature = "fit")]
 pub(crate) use colour::to_opponent;
 pub(crate) use colour::{OPPONENT, from_opponent, variance_of_channels};
 pub(crate) use file::PriorHeader;
 #[cfg(feature = "fit")]
-pub use learn::{LearnOptions, Library, learn};
+pub use learn::{LearnOptions, Library, family, learn};
 pub(crate) use span::{SPACE, Span};
 
 use std::sync::{Arc, OnceLock};
@@ -53,6 +57,8 @@ pub struct Prior {
     left: [f64; 2],
     /// The coefficients `z` of the achromatic colour of each material of the library, one row per material.
     scores: Vec<f64>,
+    /// How much wider intervals are than the process says.
+    calibration: Calibration,
 }
 
 /// Functions of a span.
@@ -87,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "b28f7ce18bdfd6bc0080fb62a5c2d4fdf9a7b26bd1315ad09f6b95a3fd2c7f0d";
+    pub const BUILT_IN_SHA256: &str = "e18d51969258ada6a866ba488b8a35fd673116777e2b55e35115253cb136548c";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]
@@ -103,6 +109,7 @@ impl Prior {
         functions: [Functions; 2],
         left: [f64; 2],
         scores: Vec<f64>,
+        calibration: Calibration,
     ) -> Result<Self> {
         let n = span.len();
         let fits = |f: &Functions| f.coefficients.len() == n * f.count();
@@ -117,7 +124,7 @@ impl Prior {
         if let Some(bad) = left.iter().find(|left| !(**left > 0.0 && left.is_finite())) {
             return Err(Error::argument("rest of a prior", "a positive number", bad));
         }
-        Ok(Self { name, materials, span, mean, functions, left, scores })
+        Ok(Self { name, materials, span, mean, functions, left, scores, calibration })
     }
 
     /// The number of principal functions of a kind of colour.
@@ -205,6 +212,11 @@ impl Prior {
     /// This prior with weights of its materials as [`Prior::adapted`]; as it is where there are none.
     pub(crate) fn weighted(self: &Arc<Self>, weights: &[f64]) -> Result<Arc<Self>> {
         Ok(if weights.is_empty() { Arc::clone(self) } else { Arc::new(self.adapted(weights)?) })
+    }
+
+    /// How much wider intervals are than the process says.
+    pub(crate) fn calibration(&self) -> &Calibration {
+        &self.calibration
     }
 
     /// The space of which its functions are part.

@@ -1,11 +1,13 @@
 //! Opens and restores: files, built-in materials, sessions and settings.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use gpbrdf_core::brdf::materials;
 use gpbrdf_core::{Content, Source};
 
 use super::{Event, Opened, Viewer};
+use crate::viewer::state::document::Document;
 use crate::viewer::state::messages::naming;
 use crate::viewer::state::session::{SavedDocument, Session};
 use crate::viewer::state::settings::Settings;
@@ -40,6 +42,44 @@ impl Viewer {
             let source = Source::open(&path).map_err(|error| naming(&path, &error))?;
             Ok(Opened { source: Box::new(source), restore })
         });
+    }
+
+    /// Reads a file of measurements again that has changed.
+    pub(super) fn reread(&self, path: PathBuf) {
+        let cannot = format!("cannot read \"{}\"", path.display());
+        let outbox = self.outbox.clone().map({
+            let path = path.clone();
+            move |result| Event::Reread(path.clone(), result)
+        });
+        in_background(&outbox, "reader", &cannot, move || {
+            let source = Source::open(&path).map_err(|error| naming(&path, &error))?;
+            match source.content {
+                Content::Samples(_) => Ok(Arc::new(source)),
+                _ => Err(format!(
+                    "\"{}\": expected measurements as before, found a {}",
+                    path.display(),
+                    source.kind
+                )),
+            }
+        });
+    }
+
+    /// Takes what a changed file says into all materials of that file. What was open stays where it cannot be read.
+    pub(super) fn renew(&mut self, path: &Path, result: Result<Arc<Source>, String>) {
+        let source = match result {
+            Ok(source) => source,
+            Err(message) => {
+                self.context.messages.error(format!("{message}; what it said before is kept"));
+                return;
+            }
+        };
+        let same = |d: &&mut Document| d.is_scattered() && d.source.path.as_deref() == Some(path);
+        for document in self.context.documents.iter_mut().filter(same) {
+            self.fitter.forget(document.id);
+            document.renew(Arc::clone(&source));
+        }
+        let count = source.samples().map_or(0, gpbrdf_core::SampleSet::len);
+        self.context.messages.note(format!("{}: read again, {count} samples", source.name));
     }
 
     /// Opens a built-in material.

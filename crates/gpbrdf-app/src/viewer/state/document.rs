@@ -5,11 +5,13 @@ use std::time::Instant;
 
 use eframe::egui::Color32;
 use gpbrdf_core::judge::{CellMetrics, ImageMetrics, LeftOut};
+use gpbrdf_core::plan::Plan;
 use gpbrdf_core::{
     Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Progress, Rgb, SampleSet, Source,
 };
 
 use crate::job::{ModelSpec, Stage};
+use crate::viewer::work::planner::Planned;
 
 /// Names a document for as long as the program runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -69,6 +71,8 @@ pub(crate) struct Document {
     /// The hyper-parameters that the last search found: the defaults of the sliders.
     pub(crate) optimum: Option<Hyper>,
     pub(crate) work: Work,
+    /// What to measure next.
+    pub(crate) planned: Option<Planned>,
 }
 
 /// Colours for lines that colour-blind readers can tell apart: M. Okabe and K. Ito, "Color Universal Design"
@@ -99,6 +103,7 @@ impl Document {
             fitted: None,
             optimum: None,
             work: Work::Idle,
+            planned: None,
         }
     }
 
@@ -143,6 +148,17 @@ impl Document {
             None if self.source_is_truth() => self.source.brdf().ok().map(|brdf| brdf.eval_half_diff(angles)),
             None => None,
         }
+    }
+
+    /// What to measure next, once it is planned.
+    pub(crate) fn plan(&self) -> Option<&Plan> {
+        self.planned.as_ref()?.plan.as_ref().ok()
+    }
+
+    /// Takes what its file says now in place of what it said before.
+    pub(crate) fn renew(&mut self, source: Arc<Source>) {
+        self.source = source;
+        (self.truth, self.requested) = (None, None);
     }
 
     /// Lets the search find the hyper-parameters again.

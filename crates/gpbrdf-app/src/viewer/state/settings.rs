@@ -22,6 +22,8 @@ pub struct Settings {
     pub(crate) view: Option<String>,
     /// The view that the overview shows where there is no room for all of them; `None` for the first.
     pub(crate) tab: Option<String>,
+    /// Whether open files of measurements are read again when they change.
+    pub(crate) watch: bool,
     /// What each pane remembers, by the name of the pane.
     pub(crate) panes: BTreeMap<String, serde_json::Value>,
 }
@@ -35,6 +37,7 @@ impl Default for Settings {
             panels: true,
             view: None,
             tab: None,
+            watch: true,
             panes: BTreeMap::new(),
         }
     }

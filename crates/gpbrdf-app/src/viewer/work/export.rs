@@ -13,6 +13,7 @@ use gpbrdf_core::formats::write_image_exr;
 use super::outbox::{Outbox, in_background};
 use super::slices::Truth;
 use super::spheres::SphereImages;
+use crate::job::{expected_errors, plan_csv};
 use crate::viewer::state::document::Document;
 use crate::viewer::state::look::SliceLook;
 
@@ -93,6 +94,24 @@ pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &O
         }
         AtomicFile::commit_all(files)?;
         Ok(format!("wrote \"{}\" and the linear pictures beside it", path.display()))
+    });
+}
+
+/// Writes the directions to measure next.
+pub(crate) fn plan(document: &Document, path: &Path, outbox: &Outbox<Saved>) {
+    let Some(plan) = document.plan().cloned() else {
+        outbox.send(Err("nothing to write: no directions have been planned yet".to_owned()));
+        return;
+    };
+    let (path, name) = (path.with_extension("csv"), document.name.clone());
+    write(outbox, move || {
+        let lines = [
+            format!("{} directions to measure, the most telling first", plan.geometries.len()),
+            format!("of: {name}").replace(char::is_control, " "),
+            expected_errors(&plan),
+        ];
+        AtomicFile::write(&path, plan_csv(&lines, &plan.geometries).as_bytes())?;
+        Ok(format!("wrote \"{}\"", path.display()))
     });
 }
 

@@ -227,7 +227,9 @@ impl Posterior for LearnedPosterior {
             gp.variance_at(&space.points(angles), &self.adapted.features(colour, angles))
         });
         let (bright, coloured) = (bright?, coloured?);
-        Ok(bright.into_iter().zip(coloured).map(|(a, c)| variance_of_channels(a, c)).collect())
+        let rows = bright.into_iter().zip(coloured).zip(angles);
+        let calibration = self.prior.calibration();
+        Ok(rows.map(|((a, c), at)| calibration.of_variance(at) * variance_of_channels(a, c)).collect())
     }
 
     fn hyper(&self) -> Option<Hyper> {

@@ -364,6 +364,13 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
     if let Some(left_out) = &fitted.left_out {
         left_out_ui(&line, ui, left_out);
     }
+    if let Some(plan) = document.plan().filter(|_| document.is_scattered()) {
+        let expected =
+            plan.errors.first().map_or("–".into(), |error| format!("{} %", short(100.0 * error)));
+        let help =
+            "Root mean square of the error of ln f over the hemisphere that the process itself expects";
+        line(ui, "Expected error", expected, help);
+    }
     if document.source_is_truth() {
         let images = fitted.images.as_ref();
         let (psnr, ssim) = (images.map(|i| i.psnr_env), images.map(|i| i.ssim_env));

@@ -11,6 +11,7 @@ use gpbrdf_core::figure::Colormap;
 use gpbrdf_core::{Brdf, HalfDiff};
 use serde::{Deserialize, Serialize};
 
+use super::directions::PLANNED;
 use crate::viewer::state::document::Document;
 use crate::viewer::state::look::{Channel, SliceLook};
 use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
@@ -49,6 +50,9 @@ const GAP: f32 = 10.0;
 /// From this width on, all tools are in one row.
 const WIDE: f32 = 780.0;
 
+/// Planned directions within this of `phi_d` of a slice are near it.
+const NEAR_SLICE: f64 = 0.35;
+
 /// Regions of a slice at `phi_d` = 90 degrees: name, `theta_h` and `theta_d` in degrees.
 const REGIONS: [(&str, f64, f64); 4] = [
     ("specular", 6.0, 45.0),
@@ -64,6 +68,8 @@ struct Look {
     #[serde(flatten)]
     slices: SliceLook,
     samples: bool,
+    /// Whether planned directions are not shown.
+    no_plan: bool,
     regions: bool,
 }
 
@@ -210,7 +216,7 @@ impl Slices {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui) {
-        let Look { slices: look, samples, regions } = &mut self.look;
+        let Look { slices: look, samples, no_plan, regions } = &mut self.look;
         let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
         let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
         let wide = ui.available_width() > WIDE;
@@ -233,6 +239,10 @@ impl Slices {
                 ui.checkbox(&mut look.chroma, "Chroma")
                     .on_hover_text("Colours divided by their largest channel");
                 ui.checkbox(samples, "Samples").on_hover_text("Where it was measured");
+                let mut plan = !*no_plan;
+                ui.checkbox(&mut plan, "Planned")
+                    .on_hover_text("Where to measure next, of measured materials");
+                *no_plan = !plan;
                 ui.checkbox(regions, "Regions").on_hover_text("Names of the regions");
                 if !wide {
                     ui.set_min_width(280.0);
@@ -308,6 +318,7 @@ impl Grid<'_> {
             let image = PlotImage::new(TITLES[i], texture.id(), PlotPoint::new(45.0, 45.0), [90.0, 90.0]);
             plot.image(image.allow_hover(false));
             self.draw_samples(plot);
+            self.draw_plan(plot);
             self.draw_regions(plot);
             navigate_plot(plot);
             plot.pointer_coordinate().filter(|_| plot.response().hovered())
@@ -329,6 +340,30 @@ impl Grid<'_> {
         if !samples.is_empty() {
             let points = Points::new("samples", samples).radius(1.6).color(self.document.colour);
             plot.points(points.allow_hover(false));
+        }
+    }
+
+    /// The planned directions with their ranks; those far from the slice are faint.
+    fn draw_plan(&self, plot: &mut PlotUi<'_>) {
+        let Some(plan) = self.document.plan().filter(|_| self.document.is_scattered() && !self.look.no_plan)
+        else {
+            return;
+        };
+        let phi_d = folded(self.look.slices.phi_d.to_radians());
+        for (rank, geometry) in plan.geometries.iter().enumerate() {
+            let angles = geometry.angles();
+            let is_near = (folded(angles.phi_d) - phi_d).abs() <= NEAR_SLICE;
+            let colour = if is_near { PLANNED } else { PLANNED.gamma_multiply(0.35) };
+            let at = [self.place(angles.theta_h.to_degrees()), angles.theta_d.to_degrees()];
+            let ring = Points::new("planned", vec![at]).radius(4.0).filled(false).color(colour);
+            plot.points(ring.allow_hover(false));
+            if is_near {
+                let text = RichText::new((rank + 1).to_string()).color(Color32::WHITE).size(10.0);
+                let at = PlotPoint::new(at[0] + 1.2, at[1] + 1.2);
+                plot.text(
+                    egui_plot::Text::new("rank", at, text).anchor(Align2::LEFT_BOTTOM).allow_hover(false),
+                );
+            }
         }
     }
 
@@ -456,9 +491,13 @@ fn sample_points(document: &Document, phi_d: f64, place: impl Fn(f64) -> f64) ->
         Some(lattice) => 0.51 * FRAC_PI_2 / lattice.shape[2] as f64,
         None => 5f64.to_radians(),
     };
-    let folded = |p: f64| if p > FRAC_PI_2 { std::f64::consts::PI - p } else { p };
     let near = fitted.samples.angles.iter().filter(|a| (folded(a.phi_d) - folded(phi_d)).abs() <= width);
     near.take(6000).map(|a| [place(a.theta_h.to_degrees()), a.theta_d.to_degrees()]).collect()
+}
+
+/// The azimuth between 0 and 90 degrees that bilateral materials take for the same.
+fn folded(phi: f64) -> f64 {
+    if phi > FRAC_PI_2 { std::f64::consts::PI - phi } else { phi }
 }
 
 /// The values at a pair of directions, with their names.
