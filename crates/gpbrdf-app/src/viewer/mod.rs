@@ -29,8 +29,8 @@ pub use state::settings::Settings;
 struct Arguments {
     /// Materials, models and sessions to open: files, or names of built-in materials.
     files: Vec<PathBuf>,
-    /// Whether open files of measurements are read again when they change, so that a measurement that is added to one is
-    /// fitted at once.
+    /// Whether open files of measurements are read again when they change, so that a measurement that is added to one
+    /// is fitted at once.
     #[arg(long, value_name = "true|false", default_value_t = true, action = clap::ArgAction::Set)]
     watch: bool,
 }

@@ -89,8 +89,8 @@ impl SearchStart {
         Self { kernel, parameters, noise, has_basis: false, variance, noise_prior }
     }
 
-    /// Adds the variance of learned basis functions of `ln f` to the parameters. The kernel describes what they leave, which
-    /// usually has the standard deviation `left`.
+    /// Adds the variance of learned basis functions of `ln f` to the parameters. The kernel describes what they leave,
+    /// which usually has the standard deviation `left`.
     pub(crate) fn with_basis(mut self, left: f64) -> Self {
         self.variance = left * left;
         self.noise_prior = NOISE_PRIOR_OF_LOG;
@@ -116,9 +116,9 @@ impl SearchStart {
         self
     }
 
-    /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the usual
-    /// variance of targets, of the noise variance about 2.5e-5 of it (1e-4 with a basis). What the samples determine they hardly change;
-    /// what the samples leave open they decide.
+    /// Adds weak log-normal priors: of length scales about the usual ones, of signal variances about the usual variance
+    /// of targets, of the noise variance about 2.5e-5 of it (1e-4 with a basis). What the samples determine they hardly
+    /// change; what the samples leave open they decide.
     pub(crate) fn with_priors(mut self, usual_lengths: [(f64, f64); 3]) -> Self {
         let terms = self.kernel.terms.len() as f64;
         let kinds = self.kernel.parameter_kinds();

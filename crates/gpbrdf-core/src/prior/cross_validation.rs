@@ -44,8 +44,8 @@ pub(super) fn folds(names: &[String]) -> Vec<usize> {
 }
 
 /// Predicts materials of the library from few samples in random directions, with a prior that is learned from the other
-/// folds, and compares the errors at the centres with the standard deviations that the processes give. The library is too
-/// small for it where fewer than 8 materials are left to learn from: then nothing is calibrated.
+/// folds, and compares the errors at the centres with the standard deviations that the processes give. The library is
+/// too small for it where fewer than 8 materials are left to learn from: then nothing is calibrated.
 pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<Calibration> {
     let folds = folds(library.names());
     let step = folds.len().div_ceil(MOST_MATERIALS).max(1);

@@ -185,9 +185,9 @@ impl Library {
 /// equally likely in advance; since they rotate the chromatic colours into each other, this changes no function.
 ///
 /// What the functions leave of unknown materials is measured on the library itself, of which one eighth at a time is
-/// left out, and so is how much wider intervals must be than the process says; materials whose names begin with the same
-/// word ([`family`]) are left out together. Cost: `O(m^2 n)` for `m` materials known at `n` directions, and two fits of
-/// few samples for each of at most 48 materials. Numbers are rounded to single precision, as in files.
+/// left out, and so is how much wider intervals must be than the process says; materials whose names begin with the
+/// same word ([`family`]) are left out together. Cost: `O(m^2 n)` for `m` materials known at `n` directions, and two
+/// fits of few samples for each of at most 48 materials. Numbers are rounded to single precision, as in files.
 ///
 /// # Errors
 /// Fewer than two materials.

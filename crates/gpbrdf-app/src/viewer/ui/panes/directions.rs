@@ -280,7 +280,7 @@ pub(super) const PLANNED: Color32 = Color32::from_rgb(0xF0, 0x5A, 0x5A);
 /// The colour of lights.
 const LIGHT: Color32 = Color32::from_rgb(0xF0, 0xD0, 0x50);
 
-/// The place of the detector in the picture: the angle from the normal, in degrees, is the distance from the centre; the
+/// The place of the detector in the picture: the angle from the normal, in degrees, is the distance from the centre. The
 /// light is to the right.
 fn detector(geometry: &Geometry) -> [f64; 2] {
     place(geometry.theta_o, geometry.phi_o.to_radians())
@@ -340,8 +340,7 @@ fn worth_ui(ui: &mut Ui, document: &Document) {
         let whose = if document.is_scattered() { "What to measure next:" } else { "What to measure first:" };
         ui.label(RichText::new(whose).strong());
         ui.label(expected).on_hover_text(
-            "Root mean square of the error of ln f over the hemisphere, weighted with the cosines: what the process \
-             expects before it is measured",
+            "Root mean square of the error of ln f, weighted with the cosines, that the process itself expects",
         );
         if let Some(found) = found {
             ui.separator();
