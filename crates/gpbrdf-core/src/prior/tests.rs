@@ -1,6 +1,8 @@
+#[cfg(feature = "fit")]
 use std::f64::consts::PI;
 
 use super::*;
+#[cfg(feature = "fit")]
 use crate::brdf::{Brdf, materials};
 
 #[cfg(feature = "fit")]

@@ -280,8 +280,8 @@ pub(super) const PLANNED: Color32 = Color32::from_rgb(0xF0, 0x5A, 0x5A);
 /// The colour of lights.
 const LIGHT: Color32 = Color32::from_rgb(0xF0, 0xD0, 0x50);
 
-/// The place of the detector in the picture: the angle from the normal, in degrees, is the distance from the centre. The
-/// light is to the right.
+/// The place of the detector in the picture: its angle from the normal, in degrees, is the distance from the centre.
+/// The light is to the right.
 fn detector(geometry: &Geometry) -> [f64; 2] {
     place(geometry.theta_o, geometry.phi_o.to_radians())
 }
