@@ -1,4 +1,4 @@
-//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.csv` or Zemax `.bsdf`.
+//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.bsdf`, `.csv` or Zemax `.bsdf`.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::formats::{
-    ExrChannels, ExrPart, SpecularGrid, SpecularTable, write_merl, write_samples_csv, write_table_exr,
-    write_zemax,
+    ExrChannels, ExrPart, RglBrdf, RglColours, RglGrid, SpecularGrid, SpecularTable, write_merl, write_rgl,
+    write_samples_csv, write_table_exr, write_zemax,
 };
 use gpbrdf_core::{Content, LatticeLayout, Layout, SampleSet, Source, Symmetry, detect_symmetry};
 
@@ -22,11 +22,15 @@ pub(crate) struct Convert {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// File to write: .binary (MERL table), .exr (table), .csv (samples), or with --format any name.
+    /// File to write: .binary (MERL table), .exr (table), .bsdf (RGL file), .csv (samples), or with --format any
+    /// name.
     output: PathBuf,
     /// What to write [default: what the name of the output says]
     #[arg(long, value_enum, value_name = "FORMAT")]
     format: Option<Written>,
+    /// Write colours of an RGL file as linear sRGB, for RGB variants of Mitsuba 3; spectra are for all others.
+    #[arg(long)]
+    rgb: bool,
     /// Number of samples of a .csv from a source that can be evaluated at any direction.
     #[arg(long, value_name = "N", default_value_t = 3072)]
     samples: usize,
@@ -39,6 +43,8 @@ enum Written {
     Merl,
     /// A table as OpenEXR.
     Exr,
+    /// An RGL file, for Mitsuba 3 (`measured`) and pbrt-v4 (`"measured"`).
+    Rgl,
     /// Samples, with their standard deviation where it is known.
     Csv,
     /// The tabular BSDF of Zemax: samples on its grid as they are, other sources at incidences and azimuths in
@@ -53,12 +59,9 @@ impl Written {
         Ok(match extension.as_str() {
             "binary" => Self::Merl,
             "exr" => Self::Exr,
+            "bsdf" => Self::Rgl,
             "csv" => Self::Csv,
-            "bsdf" => bail!(
-                "\"{}\": expected --format zemax, as several formats have names that end in .bsdf",
-                path.display()
-            ),
-            _ => bail!("\"{}\": expected a name that ends in .binary, .exr or .csv", path.display()),
+            _ => bail!("\"{}\": expected a name that ends in .binary, .exr, .bsdf or .csv", path.display()),
         })
     }
 }
@@ -66,6 +69,9 @@ impl Written {
 impl Convert {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         let format = self.format.map_or_else(|| Written::of(&self.output), Ok)?;
+        if self.rgb && !matches!(format, Written::Rgl) {
+            bail!("--rgb: expected an RGL file as output, found \"{}\"", self.output.display());
+        }
         let source = open(&self.input, self.reading, terminal)?;
         match format {
             Written::Merl => {
@@ -81,6 +87,14 @@ impl Convert {
                     channels: ExrChannels::Rgb(table.values()),
                 };
                 write_table_exr(&self.output, &[part])?;
+            }
+            Written::Rgl => {
+                let brdf = source.brdf()?;
+                let table = terminal.stage("Tabulating", || {
+                    RglBrdf::tabulate(brdf, RglGrid::default(), description(&source))
+                })?;
+                let colours = if self.rgb { RglColours::Rgb } else { RglColours::Spectral };
+                write_rgl(&self.output, &table, colours)?;
             }
             Written::Csv => write_samples_csv(&self.output, &*self.measure(&source, terminal)?)?,
             Written::Zemax => {
@@ -109,9 +123,13 @@ fn specular_table(source: &Source) -> Result<SpecularTable> {
     }
     let brdf = source.brdf()?;
     let grid = SpecularGrid::fine(detect_symmetry(brdf) == Symmetry::Bilateral);
-    let description = match &source.content {
+    Ok(SpecularTable::measure(brdf, grid, description(source)))
+}
+
+/// What a file says about its material.
+fn description(source: &Source) -> String {
+    match &source.content {
         Content::Model(_) | Content::Table(_) => source.name.clone(),
         _ => source.description.clone(),
-    };
-    Ok(SpecularTable::measure(brdf, grid, description))
+    }
 }
