@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::process::Stdio;
 
-use gpbrdf_core::Source;
 use gpbrdf_core::formats::read_samples_csv;
+use gpbrdf_core::{HalfDiff, Source};
 
 use crate::harness::{Cli, Run, data_dir};
 

@@ -16,7 +16,7 @@ use crate::formats::rgl::{RglBrdf, luminance};
 /// How an RGL file holds colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RglColours {
-    /// Smooth spectra from 420 to 670 nm, which have the colours in linear sRGB under D65. Spectral variants of
+    /// Smooth spectra from 410 to 680 nm, which have the colours in linear sRGB under D65. Spectral variants of
     /// Mitsuba 3 and pbrt-v4 read such files.
     #[default]
     Spectral,
