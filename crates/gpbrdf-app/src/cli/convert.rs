@@ -1,4 +1,4 @@
-//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.bsdf`, `.csv` or Zemax `.bsdf`.
+//! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.bsdf`, `.csv`, Zemax `.bsdf` or a texture.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::formats::{
-    ExrChannels, ExrPart, RglBrdf, RglColours, RglGrid, SpecularGrid, SpecularTable, write_merl, write_rgl,
-    write_samples_csv, write_table_exr, write_zemax,
+    ExrChannels, ExrPart, RglBrdf, RglColours, RglGrid, SpecularGrid, SpecularTable, TextureFormat,
+    write_merl, write_rgl, write_samples_csv, write_table_exr, write_texture, write_zemax,
 };
-use gpbrdf_core::{Content, LatticeLayout, Layout, SampleSet, Source, Symmetry, detect_symmetry};
+use gpbrdf_core::{Baked, Content, LatticeLayout, Layout, SampleSet, Source, Symmetry, detect_symmetry};
 
 use super::input::open;
 use super::reading::Reading;
@@ -22,8 +22,8 @@ pub(crate) struct Convert {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// File to write: .binary (MERL table), .exr (table), .bsdf (RGL file), .csv (samples), or with --format any
-    /// name.
+    /// File to write: .binary (MERL table), .exr (table), .bsdf (RGL file), .csv (samples), .dds, .ktx2, .npy or
+    /// .bin (texture), or with --format any name.
     output: PathBuf,
     /// What to write [default: what the name of the output says]
     #[arg(long, value_enum, value_name = "FORMAT")]
@@ -47,6 +47,14 @@ enum Written {
     Rgl,
     /// Samples, with their standard deviation where it is known.
     Csv,
+    /// A 3-D texture in the order of the lookup shader, as DirectDraw surface.
+    Dds,
+    /// The same as Khronos texture.
+    Ktx2,
+    /// The same as array of NumPy.
+    Npy,
+    /// The same without a header, and a JSON file that describes it.
+    Raw,
     /// The tabular BSDF of Zemax: samples on its grid as they are, other sources at incidences and azimuths in
     /// steps of 5 degrees and 41 angles from the specular direction.
     Zemax,
@@ -55,13 +63,24 @@ enum Written {
 impl Written {
     /// The format that the name of a file says.
     fn of(path: &Path) -> Result<Self> {
+        if let Some(format) = TextureFormat::of(path) {
+            return Ok(match format {
+                TextureFormat::Dds => Self::Dds,
+                TextureFormat::Ktx2 => Self::Ktx2,
+                TextureFormat::Npy => Self::Npy,
+                TextureFormat::Raw => Self::Raw,
+            });
+        }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
         Ok(match extension.as_str() {
             "binary" => Self::Merl,
             "exr" => Self::Exr,
             "bsdf" => Self::Rgl,
             "csv" => Self::Csv,
-            _ => bail!("\"{}\": expected a name that ends in .binary, .exr, .bsdf or .csv", path.display()),
+            _ => bail!(
+                "\"{}\": expected a name that ends in .binary, .exr, .bsdf, .csv, .dds, .ktx2, .npy or .bin",
+                path.display()
+            ),
         })
     }
 }
@@ -97,12 +116,26 @@ impl Convert {
                 write_rgl(&self.output, &table, colours)?;
             }
             Written::Csv => write_samples_csv(&self.output, &*self.measure(&source, terminal)?)?,
+            Written::Dds => self.write_texture(&source, TextureFormat::Dds, terminal)?,
+            Written::Ktx2 => self.write_texture(&source, TextureFormat::Ktx2, terminal)?,
+            Written::Npy => self.write_texture(&source, TextureFormat::Npy, terminal)?,
+            Written::Raw => self.write_texture(&source, TextureFormat::Raw, terminal)?,
             Written::Zemax => {
                 let table = terminal.stage("Sampling", || specular_table(&source))?;
                 write_zemax(&self.output, &table)?;
             }
         }
         terminal.summary(&format!("wrote {}", self.output.display()))
+    }
+
+    /// A texture of the source. Alpha is the standard deviation of a model, else 0.
+    fn write_texture(&self, source: &Source, format: TextureFormat, terminal: &Terminal) -> Result<()> {
+        if let Content::Model(model) = &source.content {
+            let baked = terminal.stage("Baking", || Baked::new(model))?;
+            return Ok(write_texture(&self.output, format, &baked.mean, Some(&baked.sigma))?);
+        }
+        let table = terminal.stage("Tabulating", || source.table())?;
+        Ok(write_texture(&self.output, format, &table, None)?)
     }
 
     /// The samples of the source, or samples of it on a lattice.

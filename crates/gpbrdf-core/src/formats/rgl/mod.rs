@@ -68,7 +68,7 @@ fn luminance(rgb: Rgb) -> f64 {
 const LIMIT_BYTES: u64 = 1 << 30;
 
 /// The maps of an isotropic RGL file. A measurement of the database takes about 1.3 MB, a BRDF tabulated on the
-/// default grid about 12 MB.
+/// default grid about 16 MB.
 #[derive(Clone)]
 pub struct RglBrdf {
     description: String,

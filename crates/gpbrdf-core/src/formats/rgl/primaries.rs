@@ -106,7 +106,7 @@ mod tests {
             assert!(rgb.iter().all(|x| (0.0..1.0 + 1e-6).contains(x)), "{nm}: {rgb:?}");
             assert!((rgb.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{nm}: {rgb:?}");
         }
-        // The least sum of squared slopes, found by another program (the same splitting in NumPy).
+        // The least sum of squared slopes, found by another program (SLSQP of SciPy).
         let slopes: f64 = spectra
             .windows(2)
             .map(|pair| (0..3).map(|c| (pair[1][c] - pair[0][c]).powi(2)).sum::<f64>())

@@ -28,9 +28,9 @@ pub struct RglGrid {
 }
 
 impl Default for RglGrid {
-    /// 64 incidences with 96 x 96 values each.
+    /// 48 incidences with 128 x 128 values each.
     fn default() -> Self {
-        Self { incidences: 64, resolution: 96 }
+        Self { incidences: 48, resolution: 128 }
     }
 }
 
@@ -168,7 +168,7 @@ fn density(theta_i: f64, ndf: &Map, sigma: f64) -> Vec<f32> {
 impl RglBrdf {
     /// Tabulates any isotropic BRDF. Values that are negative or no numbers become 0.
     ///
-    /// With the default grid, half of all directions are met to 0.1 %, nine in ten to 0.6 %, and 99 in 100 to a few
+    /// With the default grid, half of all directions are met to 0.1 %, nine in ten to 0.7 %, and 99 in 100 to a few
     /// per cent where no cosine is below 0.08; materials whose highlight is sharper than half a degree to less.
     /// `brdf` is evaluated `incidences x resolution^2 + 16,384` times, in parallel.
     ///
@@ -292,7 +292,7 @@ mod tests {
             let [median, most, nearly_all] = errors(brdf, &table);
             let name = &source.name;
             assert!(
-                median < 1e-3 && most < 6e-3 && nearly_all < 0.08,
+                median < 1e-3 && most < 8e-3 && nearly_all < 0.08,
                 "{name}: {median} {most} {nearly_all}"
             );
         }
