@@ -35,9 +35,6 @@ impl Default for RglGrid {
 }
 
 impl RglGrid {
-    /// The largest sizes.
-    const LIMITS: Self = Self { incidences: 1024, resolution: 1024 };
-
     /// The polar angles of incidence, radians, exact in single precision as they are stored.
     fn theta_i(self) -> impl Iterator<Item = f64> {
         (0..self.incidences).map(move |k| {
@@ -47,6 +44,8 @@ impl RglGrid {
     }
 }
 
+/// The largest number of incidences, and of rows and columns.
+const LARGEST_SIZE: usize = 1024;
 /// Power by which angles of incidence are denser towards grazing.
 const INCIDENCE_POWER: f64 = 1.3;
 /// Number of polar angles of `ndf` and `sigma`.
@@ -122,7 +121,9 @@ fn projected_area(theta_i: f64, ndf: &[f64]) -> f64 {
     let step = 1.0 / (POLAR_NODES - 1) as f64;
     let part = |(k, density): (usize, &f64)| {
         let theta = polar(k, POLAR_NODES);
-        density * visible(theta_i, theta) * theta.sin() * PI * k as f64 * step * step
+        // The trapezoid rule; at the first node there is no area.
+        let width = if k + 1 == POLAR_NODES { 0.5 * step } else { step };
+        density * visible(theta_i, theta) * theta.sin() * PI * k as f64 * step * width
     };
     ndf.iter().enumerate().map(part).sum()
 }
@@ -175,7 +176,7 @@ impl RglBrdf {
     /// # Errors
     /// [`Error::InvalidArgument`] unless both sizes of the grid are from 2 to 1,024.
     pub fn tabulate(brdf: &dyn Brdf, grid: RglGrid, description: impl Into<String>) -> Result<Self> {
-        let sizes = 2..=RglGrid::LIMITS.incidences;
+        let sizes = 2..=LARGEST_SIZE;
         if !sizes.contains(&grid.incidences) || !sizes.contains(&grid.resolution) {
             return Err(Error::argument("grid", "sizes from 2 to 1024", format!("{grid:?}")));
         }
