@@ -6,7 +6,8 @@ use serde_json::json;
 
 use crate::formats::texture::{SIZE, TEXEL_BYTES};
 
-/// The header of a NumPy array, version 1.0. Its length is a multiple of 64 bytes. Source: NumPy, `numpy.lib.format`.
+/// The header of a NumPy array, version 1.0, whose length is a multiple of 64 bytes. Source: the module
+/// `numpy.lib.format`.
 pub(super) fn npy_header() -> Vec<u8> {
     let [width, height, depth] = SIZE;
     let mut text =
