@@ -7,9 +7,9 @@
 Each INPUT is a measurement, a table, a model or a built-in material; without one, these are three built-in materials, a
 table and a fitted model. Mitsuba's plugin `measured` has to load both kinds of files, to agree with the source at some
 thousand directions, to agree with itself in a picture of a sphere in RGB and in spectra, and to pass Mitsuba's own
-chi-square test of samples against their density. Mitsuba needs a recent LLVM library for that: version 15 is too old for
-Mitsuba 3.9, whose environment variable DRJIT_LIBLLVM_PATH names another one. The test integrates densities on a grid,
-so it may fail for highlights much sharper than a degree. The exit code is 0 only if all of this holds.
+chi-square test of samples against their density. Mitsuba needs a recent LLVM library for that: version 15 is too old
+for Mitsuba 3.9, whose environment variable DRJIT_LIBLLVM_PATH names another one. The test integrates densities on a
+grid, so it may fail for highlights much sharper than a degree. The exit code is 0 only if all of this holds.
 """
 
 import csv
