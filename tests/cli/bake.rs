@@ -162,3 +162,35 @@ fn a_constant_is_learnt_exactly() {
     let bounds = report["at_bound"].as_array().unwrap();
     assert!(bounds.contains(&"noise_ratio".into()), "a constant has no noise: {bounds:?}");
 }
+
+/// The texture of a run and that of its model are the same, and each format holds the same texels.
+#[test]
+fn textures_are_written_with_the_rest() {
+    let cli = Cli::new();
+    let textures = ["x.dds", "x.ktx2", "x.npy", "x.bin"];
+    let mut arguments =
+        vec!["bake", "phong", SMALL[0], SMALL[1], "--no-images", "--no-metrics", "-q", "-o", "out"];
+    arguments.extend(textures.iter().flat_map(|name| ["--texture", *name]));
+    cli.ok(&arguments);
+    let texels = cli.read("x.bin");
+    assert_eq!(texels.len(), 90 * 90 * 180 * 8);
+    for name in textures {
+        assert!(cli.read(name).ends_with(&texels), "{name}");
+    }
+    assert!(cli.path("x.bin.json").is_file());
+    cli.ok(&["convert", "out/model.safetensors", "again.dds"]);
+    assert!(cli.read("again.dds") == cli.read("x.dds"));
+    // A table has no sigma.
+    cli.ok(&["convert", "out/table.binary", "table.bin"]);
+    let table = cli.read("table.bin");
+    for (with, without) in texels.chunks_exact(8).zip(table.chunks_exact(8)) {
+        assert!(with[..6] == without[..6] && without[6..] == [0, 0], "{with:?} {without:?}");
+    }
+    let report: Value = serde_json::from_slice(&cli.read("out/report.json")).unwrap();
+    assert!(
+        report["outputs"].as_array().unwrap().iter().any(|path| path == "x.ktx2"),
+        "{}",
+        report["outputs"]
+    );
+    assert!(cli.misused(&["bake", "phong", "--texture", "x.png"]).contains(".dds, .ktx2, .npy or .bin"));
+}

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::process::Stdio;
 
-use gpbrdf_core::Source;
 use gpbrdf_core::formats::read_samples_csv;
+use gpbrdf_core::{HalfDiff, Source};
 
 use crate::harness::{Cli, Run, data_dir};
 
@@ -79,10 +79,38 @@ fn options_say_what_a_file_does_not() {
     assert!(cli.fails(&["bake", "b.csv", "-o", "out"]).contains("noise of a dark signal) on line 3"));
 }
 
+/// With colours as linear sRGB and as spectra, from a material and from a table.
+#[test]
+fn rgl_files_are_written_for_other_renderers() {
+    let cli = Cli::new();
+    cli.ok(&["convert", "red-plastic", "t.binary"]);
+    for (input, tolerance) in [("red-plastic", 0.02), ("t.binary", 0.04)] {
+        cli.ok(&["convert", input, "rgb.bsdf", "--rgb"]);
+        cli.ok(&["convert", input, "spectra.bsdf"]);
+        let truth = Source::open(cli.path("t.binary")).unwrap();
+        let [rgb, spectra] = ["rgb.bsdf", "spectra.bsdf"].map(|name| Source::open(cli.path(name)).unwrap());
+        assert_eq!((rgb.kind.as_str(), spectra.kind.as_str()), ("RGL measurement", "RGL measurement"));
+        for k in 0..500 {
+            let t = f64::from(k) / 500.0;
+            let at =
+                HalfDiff { theta_h: 1.2 * (7.0 * t).fract(), theta_d: 0.3, phi_d: 3.1 * (31.0 * t).fract() };
+            let [truth, rgb, spectra] =
+                [&truth, &rgb, &spectra].map(|source| source.brdf().unwrap().eval_half_diff(at));
+            for c in 0..3 {
+                assert!((rgb[c] - truth[c]).abs() < tolerance * truth[0], "{at:?} {rgb:?} {truth:?}");
+                assert!((rgb[c] - spectra[c]).abs() < 1e-3 * truth[0], "{at:?} {rgb:?} {spectra:?}");
+            }
+        }
+    }
+    assert!(cli.fails(&["convert", "phong", "p.binary", "--rgb"]).starts_with("--rgb: expected an RGL file"));
+    cli.write("s.csv", "theta_i,phi_i,theta_o,phi_o,f\n10,0,60,180,1\n");
+    assert!(cli.fails(&["convert", "s.csv", "s.bsdf"]).contains("bake them first"));
+    assert!(!cli.path("s.bsdf").exists());
+}
+
 #[test]
 fn zemax_files_are_written_on_request() {
     let cli = Cli::new();
-    assert!(cli.fails(&["convert", "phong", "p.bsdf"]).contains("expected --format zemax"));
     cli.ok(&["convert", "phong", "p.bsdf", "--format", "zemax"]);
     let found = Source::open(cli.path("p.bsdf")).unwrap();
     assert_eq!(found.kind, "Zemax measurement");

@@ -9,7 +9,9 @@ use clap::Args;
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::brdf::N_CELLS;
 use gpbrdf_core::figure::{Picture, SliceOptions, slice_figure, sphere_figure};
-use gpbrdf_core::formats::{ExrChannels, ExrPart, write_merl_to, write_table_exr_to};
+use gpbrdf_core::formats::{
+    ExrChannels, ExrPart, TextureFormat, texture_files, write_merl_to, write_table_exr_to,
+};
 use gpbrdf_core::judge::render_env;
 use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
@@ -35,6 +37,10 @@ pub(crate) struct Bake {
     reading: Reading,
     #[command(flatten)]
     model: ModelSpec,
+    /// Write the baked table as a 3-D texture, too, in the order of the lookup shader: .dds, .ktx2, .npy or .bin.
+    /// May be repeated.
+    #[arg(long, value_name = "FILE", value_parser = texture_path)]
+    texture: Vec<PathBuf>,
     /// Where to bake.
     #[arg(long, value_enum, default_value_t)]
     backend: Backend,
@@ -72,6 +78,7 @@ impl Bake {
         let mut outputs = run.stage(Stage::Write, || {
             let mut outputs = Outputs::new(&self.output)?;
             outputs.write_model(&outcome)?;
+            outputs.write_textures(&self.texture, &outcome)?;
             if !self.no_images {
                 outputs.write_pictures(&source, &outcome, &environment)?;
             }
@@ -119,6 +126,16 @@ impl Outputs {
         self.add("model.safetensors", |file| Ok(file.write_all(&model)?))
     }
 
+    /// Adds textures of the tables.
+    fn write_textures(&mut self, paths: &[PathBuf], outcome: &Outcome) -> Result<()> {
+        let Some(baked) = &outcome.baked else { return Ok(()) };
+        for path in paths {
+            let format = TextureFormat::of(path).context("expected a texture")?;
+            self.files.extend(texture_files(path, format, &baked.mean, baked.sigma.as_deref())?);
+        }
+        Ok(())
+    }
+
     /// Adds a picture of one slice and one of spheres.
     fn write_pictures(
         &mut self,
@@ -149,6 +166,15 @@ impl Outputs {
 
     fn commit(self) -> Result<()> {
         Ok(AtomicFile::commit_all(self.files)?)
+    }
+}
+
+/// The name of a texture, whose end says its format.
+fn texture_path(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    match TextureFormat::of(&path) {
+        Some(_) => Ok(path),
+        None => Err("expected a name that ends in .dds, .ktx2, .npy or .bin".to_owned()),
     }
 }
 

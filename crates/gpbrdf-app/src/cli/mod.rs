@@ -65,7 +65,7 @@ enum Command {
     Render(Box<render::Render>),
     /// Learn a prior from other materials, with which fewer measurements are enough.
     Learn(learn::Learn),
-    /// Write any source as .binary, .exr, .csv or Zemax .bsdf.
+    /// Write any source as a table, samples, a texture, or a file for other renderers.
     Convert(convert::Convert),
     /// The paper's experiments, as tables and pictures.
     Reproduce(reproduce::Reproduce),

@@ -15,6 +15,7 @@ mod neural;
 pub(crate) mod read;
 mod rgl;
 pub(crate) mod source;
+mod texture;
 
 pub use checksum::{sha256_file, sha256_hex};
 pub use environment::read_environment;
@@ -29,8 +30,9 @@ pub use measured::zemax::{SpecularGrid, SpecularTable, write_zemax, write_zemax_
 pub use measured::{AngleUnit, ReadOptions, ValueKind, Zenith};
 pub use merl::{MERL_BYTES, merl_material_name, read_merl, write_merl, write_merl_to};
 pub use neural::{is_neural_csv, read_neural_csv};
-pub use rgl::{RglBrdf, read_rgl};
+pub use rgl::{RglBrdf, RglColours, RglGrid, read_rgl, write_rgl, write_rgl_to};
 pub use source::{Content, Source};
+pub use texture::{TextureFormat, texture_files, write_texture};
 
 /// The formats that can be read, in the order in which they are tried.
 pub const FORMATS: [&Format; 9] = [

@@ -11,7 +11,7 @@ pub(crate) mod cornell;
 mod input;
 mod lines;
 mod options;
-mod spectrum;
+pub(crate) mod spectrum;
 pub(crate) mod text;
 mod unit;
 pub(crate) mod zemax;

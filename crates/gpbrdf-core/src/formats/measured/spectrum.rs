@@ -110,6 +110,11 @@ impl SpectrumToRgb {
         Some(Self { weights })
     }
 
+    /// What a spectrum that is 1 at one of the wavelengths and 0 at the others adds to each channel.
+    pub(crate) fn weights(&self) -> &[Rgb] {
+        &self.weights
+    }
+
     /// Linear sRGB of one spectrum; out-of-gamut (negative) channels are set to 0.
     pub(crate) fn rgb(&self, spectrum: impl IntoIterator<Item = f64>) -> Rgb {
         let mut sum = [0.0; 3];

@@ -1,4 +1,4 @@
-//! RGL `.bsdf` measurements (EPFL material database), isotropic RGB files only.
+//! RGL `.bsdf` files (EPFL material database): isotropic measurements, read and written.
 //!
 //! Source: J. Dupuy and W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and
 //! Rendering" (2018). With `theta_m`, `phi_m` the spherical angles of the half vector `h`:
@@ -11,9 +11,17 @@
 //! ```
 //!
 //! All maps are bilinear on grids over the unit square, and linear in `theta_i` between slices. The
-//! database's evaluator returns `f cos(theta_o)`; this one divides by the cosine.
+//! database's evaluator returns `f cos(theta_o)`; this one divides by the cosine. Spectra are read as linear sRGB
+//! under D65.
 
+mod primaries;
+mod tabulate;
 mod tensor_file;
+mod warp;
+mod write;
+
+pub use tabulate::RglGrid;
+pub use write::{RglColours, write_rgl, write_rgl_to};
 
 use crate::formats::format::{Format, Reader};
 use crate::formats::source::Content;
@@ -25,12 +33,11 @@ use nalgebra::Vector3;
 use crate::base::error::Result;
 use crate::brdf::Reciprocal;
 use crate::brdf::angles::HORIZON_COSINE;
-use crate::brdf::{Brdf, Rgb};
+use crate::brdf::{Brdf, LUMINANCE_WEIGHTS, Rgb};
+use crate::formats::measured::spectrum::SpectrumToRgb;
 use crate::formats::read::read_bytes;
-use crate::formats::rgl::tensor_file::{TensorFile, U8};
-
-/// Bytes at the start of an RGL file.
-const MAGIC: &[u8] = b"tensor_file\0";
+use crate::formats::rgl::tensor_file::{MAGIC, TensorFile, U8};
+use crate::formats::rgl::warp::{Map, Warp, mix, node};
 
 /// Smallest cosine at which measurements are evaluated: closer to the horizon they are extrapolated.
 const MIN_MEASURED_COSINE: f64 = 0.02;
@@ -51,11 +58,17 @@ pub(crate) const FORMAT: Format = Format {
     read: Reader::File(read_reciprocal),
 };
 
+/// Relative luminance of linear sRGB.
+fn luminance(rgb: Rgb) -> f64 {
+    rgb.iter().zip(LUMINANCE_WEIGHTS).map(|(x, weight)| x * weight).sum()
+}
+
 /// Limit on the size of a file; every file of the database is smaller, spectral and anisotropic ones
 /// included.
 const LIMIT_BYTES: u64 = 1 << 30;
 
-/// An isotropic RGB measurement of the RGL database. It takes about 1.3 MB.
+/// The maps of an isotropic RGL file. A measurement of the database takes about 1.3 MB, a BRDF tabulated on the
+/// default grid about 16 MB.
 #[derive(Clone)]
 pub struct RglBrdf {
     description: String,
@@ -75,118 +88,6 @@ pub struct RglBrdf {
     rgb: Vec<[f32; 3]>,
 }
 
-/// A scalar map on a grid over the unit square.
-#[derive(Clone)]
-struct Map {
-    height: usize,
-    width: usize,
-    values: Vec<f32>,
-}
-
-/// The cumulative distribution of visible normals; each slice integrates to 1.
-#[derive(Clone)]
-struct Warp {
-    height: usize,
-    width: usize,
-    /// Density at a node, and its integral along the row from the start to the node; `[theta_i][y][x]`.
-    nodes: Vec<[f32; 2]>,
-    /// Integral over all rows up to this one; `[theta_i][y]`.
-    rows: Vec<f32>,
-}
-
-/// The lower node and the weight of the upper one, at `t` in `[0, 1]` on `n >= 2` nodes.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the nodes; NaN is 0")]
-fn node(t: f64, n: usize) -> (usize, f64) {
-    let x = t.clamp(0.0, 1.0) * (n - 1) as f64;
-    let low = (x as usize).min(n - 2);
-    (low, x - low as f64)
-}
-
-fn mix(a: f64, b: f64, t: f64) -> f64 {
-    a + t * (b - a)
-}
-
-impl Map {
-    fn eval(&self, x: f64, y: f64) -> f64 {
-        let (i, a) = node(x, self.width);
-        let (j, b) = node(y, self.height);
-        let at = |j: usize| {
-            let row = j * self.width + i;
-            mix(self.values[row].into(), self.values[row + 1].into(), a)
-        };
-        mix(at(j), at(j + 1), b)
-    }
-}
-
-impl Warp {
-    /// Integrates `vndf`, `[theta_i][y][x]`, by the trapezoid rule with unit spacing. The error is the index
-    /// of a slice that is zero everywhere.
-    fn new(height: usize, width: usize, vndf: &[f32]) -> Result<Self, usize> {
-        let mut nodes = Vec::with_capacity(vndf.len());
-        let mut rows = Vec::with_capacity(vndf.len() / width);
-        let mut row_totals = Vec::with_capacity(height);
-        let mut integrals = vec![0.0; height * width];
-        for (slice, values) in vndf.chunks_exact(height * width).enumerate() {
-            row_totals.clear();
-            for (row, integral) in values.chunks_exact(width).zip(integrals.chunks_exact_mut(width)) {
-                let mut sum = 0.0;
-                for x in 1..width {
-                    sum += 0.5 * (f64::from(row[x - 1]) + f64::from(row[x]));
-                    integral[x] = sum;
-                }
-                row_totals.push(sum);
-            }
-            let total: f64 = row_totals.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).sum();
-            if !(total > 0.0) {
-                return Err(slice);
-            }
-            #[expect(clippy::cast_possible_truncation, reason = "f32 is the file's precision")]
-            {
-                nodes.extend(values.iter().zip(&integrals).map(|(&density, &integral)| {
-                    [(f64::from(density) / total) as f32, (integral / total) as f32]
-                }));
-                let mut sum = 0.0;
-                rows.push(0.0);
-                for pair in row_totals.windows(2) {
-                    sum += 0.5 * (pair[0] + pair[1]);
-                    rows.push((sum / total) as f32);
-                }
-            }
-        }
-        Ok(Self { height, width, nodes, rows })
-    }
-
-    /// The point that is mapped to `(x, y)` by the warp of slices `low` and `high`, blended with the weight
-    /// `weight` of `high`.
-    fn invert(&self, low: usize, high: usize, weight: f64, x: f64, y: f64) -> (f64, f64) {
-        let (i, a) = node(x, self.width);
-        let (j, b) = node(y, self.height);
-        let size = self.height * self.width;
-        let row = j * self.width;
-        let blend = |index: usize| {
-            let [v0, c0] = self.nodes[low * size + index];
-            let [v1, c1] = self.nodes[high * size + index];
-            [mix(v0.into(), v1.into(), weight), mix(c0.into(), c1.into(), weight)]
-        };
-        let [v00, c00] = blend(row + i);
-        let [v01, _] = blend(row + i + 1);
-        let [v10, c10] = blend(row + self.width + i);
-        let [v11, _] = blend(row + self.width + i + 1);
-        let [_, r0] = blend(row + self.width - 1);
-        let [_, r1] = blend(row + 2 * self.width - 1);
-        let m =
-            mix(self.rows[low * self.height + j].into(), self.rows[high * self.height + j].into(), weight);
-        let left = mix(v00, v10, b);
-        let right = mix(v01, v11, b);
-        let along = a * (left + 0.5 * a * (right - left)) + mix(c00, c10, b);
-        let total = mix(r0, r1, b);
-        // A row without density is never sampled, so any value will do.
-        let s_x = if total > 0.0 { along / total } else { 0.0 };
-        let s_y = m + b * (r0 + 0.5 * b * (r1 - r0));
-        (s_x, s_y)
-    }
-}
-
 impl RglBrdf {
     /// What the file says about its material.
     #[must_use]
@@ -196,12 +97,6 @@ impl RglBrdf {
 
     fn parse(bytes: &[u8], path: &Path) -> Result<Self> {
         let file = TensorFile::parse(bytes, path)?;
-        if file.get("rgb").is_none() && file.get("spectra").is_some() {
-            return Err(file.wrong(
-                "an RGB measurement (field `rgb`)",
-                "a spectral one (field `spectra`); the database has the RGB variant as `*_rgb.bsdf`",
-            ));
-        }
         let description =
             String::from_utf8_lossy(file.field("description", U8, 1)?.bytes).trim_matches('\0').to_owned();
 
@@ -249,14 +144,36 @@ impl RglBrdf {
             file.wrong("a positive sum of each slice of field `vndf`", format!("zero in slice {slice}"))
         })?;
 
-        let (shape, planes) = file.floats("rgb", 5)?;
-        sized("rgb", &shape, &[1, slices, 3, 0, 0])?;
-        let (rgb_height, rgb_width) = (shape[3], shape[4]);
-        let size = rgb_height * rgb_width;
-        let rgb = planes
-            .chunks_exact(3 * size)
-            .flat_map(|slice| (0..size).map(|k| [slice[k], slice[size + k], slice[2 * size + k]]))
-            .collect();
+        let (rgb_height, rgb_width, rgb);
+        if file.get("rgb").is_none() && file.get("spectra").is_some() {
+            let (_, wavelengths) = file.floats("wavelengths", 1)?;
+            let nm: Vec<f64> = wavelengths.iter().map(|&nm| nm.into()).collect();
+            let map = SpectrumToRgb::new(&nm).ok_or_else(|| {
+                file.wrong("increasing wavelengths within 380 to 780 nm", format!("{wavelengths:?}"))
+            })?;
+            let (shape, planes) = file.floats("spectra", 5)?;
+            sized("spectra", &shape, &[1, slices, nm.len(), 0, 0])?;
+            (rgb_height, rgb_width) = (shape[3], shape[4]);
+            let size = rgb_height * rgb_width;
+            let spectrum = |slice: &[f32], k: usize| -> [f32; 3] {
+                #[expect(clippy::cast_possible_truncation, reason = "f32 is the file's precision")]
+                map.rgb(slice.iter().skip(k).step_by(size).map(|&x| x.into())).map(|x| x as f32)
+            };
+            rgb = planes
+                .chunks_exact(nm.len() * size)
+                .flat_map(|slice| (0..size).map(move |k| (slice, k)))
+                .map(|(slice, k)| spectrum(slice, k))
+                .collect();
+        } else {
+            let (shape, planes) = file.floats("rgb", 5)?;
+            sized("rgb", &shape, &[1, slices, 3, 0, 0])?;
+            (rgb_height, rgb_width) = (shape[3], shape[4]);
+            let size = rgb_height * rgb_width;
+            rgb = planes
+                .chunks_exact(3 * size)
+                .flat_map(|slice| (0..size).map(|k| [slice[k], slice[size + k], slice[2 * size + k]]))
+                .collect();
+        }
 
         let jacobian = match file.get("jacobian") {
             Some(_) => file.field("jacobian", U8, 1)?.bytes.first() != Some(&0),
@@ -340,11 +257,12 @@ impl std::fmt::Debug for RglBrdf {
     }
 }
 
-/// Reads an RGL `.bsdf` file with an isotropic RGB measurement.
+/// Reads an RGL `.bsdf` file of an isotropic material. Spectra become linear sRGB under D65, out-of-gamut
+/// (negative) channels 0.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io) when the file cannot be read; [`Error::Format`](crate::Error::Format) when
-/// it is damaged, spectral or anisotropic, or lacks a field.
+/// it is damaged or anisotropic, or lacks a field.
 pub fn read_rgl(path: impl AsRef<Path>) -> Result<RglBrdf> {
     let path = path.as_ref();
     RglBrdf::parse(&read_bytes(path, "RGL", LIMIT_BYTES)?, path)
@@ -447,46 +365,19 @@ mod tests {
         assert_eq!(plain.eval(&Vector3::z(), &Vector3::z()), [0.5, 1.0, 0.0]);
     }
 
-    /// A forward warp, found by bisection on the integrals of the blended density, undoes `invert`.
+    /// A flat spectrum is grey, and one of long waves is red.
     #[test]
-    fn warp_is_the_cumulative_distribution() {
-        let mut random = Random::new(11);
-        let (height, width) = (5, 4);
-        let vndf: Vec<f32> = (0..2 * height * width).map(|_| 0.1 + random.below(100) as f32).collect();
-        let warp = Warp::new(height, width, &vndf).unwrap();
-        let weight = 0.3;
-        let normalised: Vec<f64> = (0..height * width)
-            .map(|k| {
-                let mass = |slice: usize| -> f64 {
-                    let at = |y: usize, x: usize| f64::from(vndf[(slice * height + y) * width + x]);
-                    let cells = (0..height - 1).flat_map(|y| (0..width - 1).map(move |x| (y, x)));
-                    cells
-                        .map(|(y, x)| 0.25 * (at(y, x) + at(y + 1, x) + at(y, x + 1) + at(y + 1, x + 1)))
-                        .sum()
-                };
-                mix(f64::from(vndf[k]) / mass(0), f64::from(vndf[height * width + k]) / mass(1), weight)
-            })
-            .collect();
-        let density = |x: f64, y: f64| {
-            let ((i, a), (j, b)) = (node(x, width), node(y, height));
-            let row = |j: usize| mix(normalised[j * width + i], normalised[j * width + i + 1], a);
-            mix(row(j), row(j + 1), b)
+    fn spectra_become_linear_srgb() {
+        let spectral = |low: f32, high: f32| {
+            let planes = [constant(low, 4), constant(high, 4)].concat().repeat(2);
+            let maker = Maker::new().without("rgb").with("spectra", F32, vec![1, 2, 2, 2, 2], planes);
+            let maker = maker.with("wavelengths", F32, vec![2], f32s([570.0, 610.0]));
+            parse(&maker.bytes()).unwrap().eval(&Vector3::z(), &Vector3::z())
         };
-        // The integral is taken by the midpoint rule in the cells of a fine grid.
-        let steps = 3 * 400;
-        let integral = |to: f64, f: &dyn Fn(f64) -> f64| -> f64 {
-            let h = to / f64::from(steps);
-            (0..steps).map(|k| f((f64::from(k) + 0.5) * h) * h).sum()
-        };
-        for (x, y) in [(0.2, 0.7), (0.9, 0.1), (0.5, 0.5), (1.0, 0.33)] {
-            let (s_x, s_y) = warp.invert(0, 1, weight, x, y);
-            let scale = (width - 1) as f64;
-            let expected_x = integral(x, &|t| density(t, y)) / integral(1.0, &|t| density(t, y));
-            let expected_y =
-                integral(y, &|t| integral(1.0, &|s| density(s, t)) * scale * (height - 1) as f64);
-            assert!((s_x - expected_x).abs() < 1e-5, "{s_x} {expected_x}");
-            assert!((s_y - expected_y).abs() < 1e-5, "{s_y} {expected_y}");
-        }
+        let grey = spectral(0.5, 0.5);
+        assert!(grey.iter().all(|x| (x - 0.75).abs() < 1e-6), "{grey:?}");
+        let red = spectral(0.0, 0.5);
+        assert!(red[0] > 4.0 * red[1] && red[2] < 1e-2, "{red:?}");
     }
 
     #[test]
@@ -550,8 +441,16 @@ mod tests {
 
     #[test]
     fn unfit_files_are_named() {
-        let spectral = Maker::new().without("rgb").with("spectra", F32, vec![1], constant(0.0, 1));
-        assert!(spectral.error().contains("found a spectral one"), "{}", spectral.error());
+        let spectral =
+            Maker::new().without("rgb").with("spectra", F32, vec![1, 2, 1, 2, 2], constant(0.0, 8));
+        assert!(spectral.error().contains("expected a field `wavelengths`"), "{}", spectral.error());
+        let infrared = spectral.with("wavelengths", F32, vec![1], f32s([900.0]));
+        assert!(
+            infrared.error().contains("wavelengths within 380 to 780 nm, found [900.0]"),
+            "{}",
+            infrared.error()
+        );
+        assert!(Maker::new().without("rgb").error().contains("expected a field `rgb`"));
         let anisotropic = Maker::new().with("phi_i", F32, vec![3], constant(0.0, 3));
         assert!(anisotropic.error().contains("anisotropic one (3 azimuths), which is not supported"));
         assert!(Maker::new().without("sigma").error().contains("expected a field `sigma`, found only"));

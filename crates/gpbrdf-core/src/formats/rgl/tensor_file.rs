@@ -6,9 +6,13 @@
 //! Dupuy and W. Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering"
 //! (2018).
 
+use std::io::{self, Write};
 use std::path::Path;
 
 use crate::base::error::{Error, Result};
+
+/// Bytes at the start of a tensor file.
+pub(super) const MAGIC: &[u8] = b"tensor_file\0";
 
 /// The `dtype` of `f32` arrays.
 pub(super) const F32: u8 = 10;
@@ -37,6 +41,61 @@ pub(super) struct Field<'a> {
     dtype: u8,
     pub(super) shape: Vec<usize>,
     pub(super) bytes: &'a [u8],
+}
+
+/// One array to be written.
+#[derive(Clone, Debug)]
+pub(super) struct NewField {
+    name: &'static str,
+    dtype: u8,
+    shape: Vec<usize>,
+    bytes: Vec<u8>,
+}
+
+impl NewField {
+    /// A field of single-precision numbers.
+    pub(super) fn floats(name: &'static str, shape: &[usize], values: impl IntoIterator<Item = f32>) -> Self {
+        let bytes = values.into_iter().flat_map(f32::to_le_bytes).collect();
+        Self { name, dtype: F32, shape: shape.to_vec(), bytes }
+    }
+
+    /// A field of bytes.
+    pub(super) fn bytes(name: &'static str, bytes: Vec<u8>) -> Self {
+        Self { name, dtype: U8, shape: vec![bytes.len()], bytes }
+    }
+}
+
+/// Distance between the starts of arrays is a multiple of this, so that a program may use them in place.
+const ALIGNMENT: usize = 8;
+
+/// Writes a tensor file with these arrays.
+pub(super) fn write(mut to: impl Write, fields: &[NewField]) -> io::Result<()> {
+    let header: usize =
+        MAGIC.len() + 2 + 4 + fields.iter().map(|f| 13 + f.name.len() + 8 * f.shape.len()).sum::<usize>();
+    to.write_all(MAGIC)?;
+    to.write_all(&[1, 0])?;
+    to.write_all(&u32::try_from(fields.len()).map_err(io::Error::other)?.to_le_bytes())?;
+    let mut offset = header.next_multiple_of(ALIGNMENT);
+    for field in fields {
+        let length = |n: usize| u16::try_from(n).map_err(io::Error::other);
+        to.write_all(&length(field.name.len())?.to_le_bytes())?;
+        to.write_all(field.name.as_bytes())?;
+        to.write_all(&length(field.shape.len())?.to_le_bytes())?;
+        to.write_all(&[field.dtype])?;
+        to.write_all(&(offset as u64).to_le_bytes())?;
+        for &length in &field.shape {
+            to.write_all(&(length as u64).to_le_bytes())?;
+        }
+        offset = (offset + field.bytes.len()).next_multiple_of(ALIGNMENT);
+    }
+    let mut end = header;
+    for field in fields {
+        let start = end.next_multiple_of(ALIGNMENT);
+        to.write_all(&[0; ALIGNMENT][..start - end])?;
+        to.write_all(&field.bytes)?;
+        end = start + field.bytes.len();
+    }
+    to.flush()
 }
 
 /// The arrays of a tensor file, borrowed from its bytes.
@@ -72,10 +131,10 @@ impl<'a> TensorFile<'a> {
         if bytes.is_empty() {
             return Err(file.wrong("a tensor file", "an empty file"));
         }
-        if !bytes.starts_with(super::MAGIC) {
+        if !bytes.starts_with(MAGIC) {
             return Err(file.wrong("\"tensor_file\" at the start", "something else"));
         }
-        let mut cursor = Cursor { bytes, at: super::MAGIC.len() };
+        let mut cursor = Cursor { bytes, at: MAGIC.len() };
         let cut = || file.wrong("a whole header", format!("{} bytes that end within it", bytes.len()));
         let version = cursor.array::<2>().ok_or_else(cut)?;
         if version != [1, 0] {
