@@ -95,12 +95,7 @@ impl EnvironmentLight {
         let limits = context.device().limits();
         let side = limits.max_texture_dimension_2d as usize;
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let fits = |columns: usize, rows: usize| {
-            let shares = size_of::<f32>() as u64 * shares_of(columns, rows) as u64;
-            columns.max(rows) <= side && columns * rows <= MAX_PIXELS && shares <= bytes
-        };
-        let factor =
-            (1..width.max(height)).find(|&k| fits(width.div_ceil(k), height.div_ceil(k))).unwrap_or(1);
+        let factor = factor_to_fit([width, height], side, bytes);
         if factor == 1 {
             return Ok(Self::new(environment));
         }
@@ -152,6 +147,16 @@ impl From<&Environment> for EnvironmentLight {
     fn from(environment: &Environment) -> Self {
         Self::new(environment)
     }
+}
+
+/// How many pixels become one along each axis, so that a map has at most `side` of them along either, at most
+/// [`MAX_PIXELS`] in all, and running shares of at most `bytes`.
+fn factor_to_fit([width, height]: [usize; 2], side: usize, bytes: u64) -> usize {
+    let fits = |columns: usize, rows: usize| {
+        let shares = size_of::<f32>() as u64 * shares_of(columns, rows) as u64;
+        columns.max(rows) <= side && columns * rows <= MAX_PIXELS && shares <= bytes
+    };
+    (1..width.max(height)).find(|&k| fits(width.div_ceil(k), height.div_ceil(k))).unwrap_or(1)
 }
 
 /// Numbers of the running shares of a map.
@@ -214,6 +219,18 @@ mod tests {
         let lamp = EnvironmentLight::new(&Environment::new(map).unwrap());
         assert_eq!(lamp.texels().at(0, 0)[3], 0.0);
         assert!((f64::from(lamp.texels().at(2, 1)[3]) * PI / 2.0 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn large_maps_are_averaged_until_a_device_can_hold_them() {
+        // The smallest binding that is common: 128 MiB, which the shares of 8192 x 4096 pixels exceed by a little.
+        let modest = 128 << 20;
+        assert_eq!(factor_to_fit([4096, 2048], 8192, modest), 1);
+        assert_eq!(factor_to_fit([8192, 4096], 8192, modest), 2);
+        assert_eq!(factor_to_fit([8192, 4096], 16_384, 1 << 31), 1);
+        assert_eq!(factor_to_fit([16_384, 8192], 16_384, 1 << 31), 2);
+        assert_eq!(factor_to_fit([20_001, 3], 2048, modest), 10);
+        assert_eq!(factor_to_fit([1, 1], 2048, modest), 1);
     }
 
     #[test]

@@ -498,7 +498,11 @@ mod tests {
     fn broken_files_are_refused_by_what_is_wrong() {
         let change = |at: &str, value: Value| {
             let mut document = triangle();
-            *document.pointer_mut(at).unwrap() = value;
+            let (place, member) = at.rsplit_once('/').unwrap();
+            match document.pointer_mut(place).unwrap() {
+                Value::Array(list) => list[member.parse::<usize>().unwrap()] = value,
+                other => other[member] = value,
+            }
             document
         };
         let mut draco = triangle();
