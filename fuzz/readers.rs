@@ -11,10 +11,10 @@ use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Model, Source};
 
 /// The function of a reader. It returns whether the bytes were accepted.
-pub type Reader = fn(&[u8]) -> bool;
+pub(crate) type Reader = fn(&[u8]) -> bool;
 
 /// All readers by name.
-pub const READERS: [(&str, Reader); 13] = [
+pub(crate) const READERS: [(&str, Reader); 13] = [
     ("merl", merl),
     ("rgl", rgl),
     ("table_exr", table_exr),
@@ -40,67 +40,67 @@ fn with_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> Option<T>) -> bool {
 }
 
 /// MERL tables.
-pub fn merl(bytes: &[u8]) -> bool {
+pub(crate) fn merl(bytes: &[u8]) -> bool {
     with_file(bytes, |path| read_merl(path).ok())
 }
 
 /// RGL measurements.
-pub fn rgl(bytes: &[u8]) -> bool {
+pub(crate) fn rgl(bytes: &[u8]) -> bool {
     with_file(bytes, |path| read_rgl(path).ok())
 }
 
 /// Tables as OpenEXR.
-pub fn table_exr(bytes: &[u8]) -> bool {
+pub(crate) fn table_exr(bytes: &[u8]) -> bool {
     with_file(bytes, |path| read_table_exr(path).ok())
 }
 
 /// Weights of neural BRDFs.
-pub fn neural(bytes: &[u8]) -> bool {
+pub(crate) fn neural(bytes: &[u8]) -> bool {
     with_file(bytes, |path| read_neural_csv(path).ok())
 }
 
 /// Measurements as text: CSV and its dialects, Cornell, Zemax, ALTA and ASTM, told apart by their content.
-pub fn measured(bytes: &[u8]) -> bool {
+pub(crate) fn measured(bytes: &[u8]) -> bool {
     Source::parse(bytes, NAME, &ReadOptions::default()).is_ok()
 }
 
 /// Lists of directions.
-pub fn directions(bytes: &[u8]) -> bool {
+pub(crate) fn directions(bytes: &[u8]) -> bool {
     parse_directions_csv(bytes, NAME, &ReadOptions::default()).is_ok()
 }
 
 /// Fitted models.
-pub fn model(bytes: &[u8]) -> bool {
+pub(crate) fn model(bytes: &[u8]) -> bool {
     Model::from_bytes(bytes, NAME).is_ok()
 }
 
 /// Learned priors.
-pub fn prior(bytes: &[u8]) -> bool {
+pub(crate) fn prior(bytes: &[u8]) -> bool {
     Prior::from_bytes(bytes, NAME).is_ok()
 }
 
 /// Wavefront OBJ meshes, and glTF ones whose bytes say so.
-pub fn mesh(bytes: &[u8]) -> bool {
+pub(crate) fn mesh(bytes: &[u8]) -> bool {
     gpbrdf_render::parse_mesh(bytes, NAME).is_ok()
 }
 
 /// glTF meshes: the part after the signature of a binary file is fuzzed.
-pub fn gltf(bytes: &[u8]) -> bool {
+pub(crate) fn gltf(bytes: &[u8]) -> bool {
     let signed = bytes.starts_with(b"glTF") || bytes.trim_ascii_start().starts_with(b"{");
     if signed { mesh(bytes) } else { mesh(&[b"glTF\x02\0\0\0", bytes].concat()) }
 }
 
 /// Environment maps, Radiance and OpenEXR.
-pub fn environment(bytes: &[u8]) -> bool {
+pub(crate) fn environment(bytes: &[u8]) -> bool {
     parse_environment(bytes, NAME).is_ok()
 }
 
 /// Sessions of the viewer.
-pub fn session(bytes: &[u8]) -> bool {
+pub(crate) fn session(bytes: &[u8]) -> bool {
     gpbrdf_app::viewer::check_session(bytes, NAME).is_ok()
 }
 
 /// Whatever can be opened, told by its content.
-pub fn any(bytes: &[u8]) -> bool {
+pub(crate) fn any(bytes: &[u8]) -> bool {
     with_file(bytes, |path| Source::open(path).ok())
 }

@@ -21,8 +21,8 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// Bytes beyond the size of a file that a reader may hold while it refuses the file.
 const SPARE: usize = 64 << 20;
 
-/// Damaged copies of each file.
-const COPIES: usize = 400;
+/// Damaged copies of each file; `GPBRDF_COPIES` asks for another number.
+const COPIES: usize = 2000;
 
 /// The first bytes, most of which are headers, are damaged more often.
 const HEAD: usize = 400;
@@ -47,6 +47,8 @@ fn check(name: &str, reader: functions::Reader, bytes: &[u8], what: &str) -> boo
 /// One test, as it counts the memory of the whole program.
 #[test]
 fn no_reader_panics_or_takes_more_memory_than_a_file_accounts_for() {
+    let given = std::env::var("GPBRDF_COPIES").ok().and_then(|number| number.parse().ok());
+    let copies = given.unwrap_or(COPIES);
     let folder = std::env::var_os("GPBRDF_CORPUS").map(std::path::PathBuf::from);
     for (name, reader) in READERS {
         let files = corpus::files(name);
@@ -60,7 +62,7 @@ fn no_reader_panics_or_takes_more_memory_than_a_file_accounts_for() {
             assert!(check(name, reader, bytes, "the whole file"), "{name}: file {i} is refused");
             let mut refused = 0;
             // A table of 35 MB is not changed as often.
-            let copies = if bytes.len() > 1 << 20 { 4 } else { COPIES };
+            let copies = if bytes.len() > 1 << 20 { copies.div_ceil(400) } else { copies };
             for (k, copy) in damage::copies(bytes, HEAD, 1 + i as u64, copies).enumerate() {
                 refused += usize::from(!check(name, reader, &copy, &format!("copy {k} of file {i}")));
             }

@@ -1,6 +1,6 @@
 //! Small whole files of every kind.
 
-use gpbrdf_core::brdf::NEURAL_FLOATS;
+use gpbrdf_core::brdf::analytic::NEURAL_FLOATS;
 use gpbrdf_core::formats::{ExrChannels, ExrPart, write_image_exr, write_merl_to, write_table_exr_to};
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{BrdfTable, FitOptions, LatticeLayout, Layout, Source, Symmetry, fit};
@@ -13,7 +13,7 @@ const MEASURED: [&[u8]; 11] = [
       1\x000\0\t\x002\0\t\x003\x000\0\t\x001\0\n\0",
     b"# Wood (caf\xE9)\n# theta_i phi_i theta_o phi_o f sigma\n10 0 20 180 0.1 0.01\n30 0 40 90 0.3 0.02\n",
     b"theta_i,phi_i,theta_o,phi_o,400nm,500nm,600nm,700nm\n10,0,20,180,0.1,0.2,0.3,0.4\n",
-    b"wi_x,wi_y,wi_z,wo_x,wo_y,wo_z,f\n0,0,1,0.6,0,0.8,0.5\n0.6,0,0.8,0,0,1,0.25\n",
+    b"theta_h,theta_d,phi_d,r,g,b\n10,20,30,0.1,0.2,0.3\n0,0,0,1,1,1\n",
     b"# Grey\n\n# num wls\n3\n# wls\n400 550\n700 # nm\n# rows\n0.5 0 0.25 -2.5 0.2 0.2 0.2\n",
     b"# Vinyl\nSource  Measured\nSymmetry PlaneSymmetrical\nSpectralContent Monochrome\nScatterType BRDF\n\
       SampleRotation 1\n0\nAngleOfIncidence 2\n10 30\nScatterAzimuth 3\n0 90 180\nScatterRadial 3\n0 30 70\n\n\
@@ -46,7 +46,7 @@ pub(crate) fn files(reader: &str) -> Vec<Vec<u8>> {
         "measured" => texts(&MEASURED),
         "directions" => texts(&[
             b"theta_i,phi_i,theta_o,phi_o\n10,0,20,180\n30,0,40,90\n",
-            b"theta_h theta_d phi_d\n10 20 30\n0 0 0\n",
+            b"theta_h,theta_d,phi_d\n10,20,30\n40,5,90\n",
         ]),
         "model" => vec![model()],
         "prior" => vec![Prior::built_in().to_bytes().unwrap()],
