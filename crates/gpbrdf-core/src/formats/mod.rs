@@ -17,7 +17,7 @@ mod rgl;
 pub(crate) mod source;
 
 pub use checksum::{sha256_file, sha256_hex};
-pub use environment::{is_environment, parse_environment, read_environment};
+pub use environment::{is_environment, parse_environment, read_environment, read_linear_image};
 pub use exr::image::write_image_exr;
 pub use exr::table::{
     ExrChannels, ExrPart, is_table_exr, read_table_exr, write_table_exr, write_table_exr_to,

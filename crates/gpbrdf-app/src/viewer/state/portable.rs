@@ -28,7 +28,7 @@ impl PortablePath {
     /// Where the file is now: by the way from this folder if there is a file, else where it was.
     pub(crate) fn resolve(&self, folder: &Path) -> PathBuf {
         let beside = self.relative.as_ref().map(|relative| folder.join(relative));
-        beside.filter(|path| path.exists()).map_or_else(|| self.path.clone(), tidy)
+        beside.filter(|path| path.exists()).map_or_else(|| self.path.clone(), |path| tidy(&path))
     }
 
     /// Replaces, in `value`, all texts that are one of these paths by where the file is now.
@@ -59,13 +59,14 @@ fn replace(value: &mut Value, places: &HashMap<String, String>) {
 
 /// The way from a folder to a file, both absolute.
 fn relative(path: &Path, folder: &Path) -> Option<String> {
-    let (path, folder) = (tidy(path.to_owned()), tidy(folder.to_owned()));
+    let (path, folder) = (tidy(path), tidy(folder));
     let (mut to, mut from) = (path.components().peekable(), folder.components().peekable());
     let mut common = 0;
     while let (Some(a), Some(b)) = (to.peek(), from.peek())
         && a == b
     {
-        (to.next(), from.next());
+        to.next();
+        from.next();
         common += 1;
     }
     if common == 0 {
@@ -77,7 +78,7 @@ fn relative(path: &Path, folder: &Path) -> Option<String> {
 }
 
 /// A path without `.`, and without `..` after a name.
-fn tidy(path: PathBuf) -> PathBuf {
+fn tidy(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match (part, parts.last()) {

@@ -73,6 +73,33 @@ pub fn read_environment(path: impl AsRef<Path>) -> Result<Environment> {
 /// Those of [`read_environment`].
 pub fn parse_environment(bytes: &[u8], path: impl AsRef<Path>) -> Result<Environment> {
     let path = path.as_ref();
+    let (format, Decoded { mut raster, is_lat_long }) = decode(bytes, path)?;
+    let refused = refused(format, path);
+    if !is_lat_long {
+        check_shape(raster.width(), raster.height()).map_err(&refused)?;
+    }
+    for value in raster.pixels_mut().iter_mut().flatten() {
+        // `max` is not used, since it would turn NaN into 0.
+        if *value < 0.0 {
+            *value = 0.0;
+        }
+    }
+    Environment::new(raster).map_err(|error| refused(Refused::new("finite radiance", error.to_string())))
+}
+
+/// Reads a picture of any shape in linear RGB, as [`read_environment`] reads maps. Values may be negative or not
+/// finite.
+///
+/// # Errors
+/// Those of [`read_environment`] but for shapes and values.
+pub fn read_linear_image(path: impl AsRef<Path>) -> Result<Raster<[f32; 3]>> {
+    let path = path.as_ref();
+    let (_, decoded) = decode(&read_bytes(path, "picture", MAX_BYTES)?, path)?;
+    Ok(decoded.raster)
+}
+
+/// The name of the format and the pixels of a file.
+fn decode(bytes: &[u8], path: &Path) -> Result<(&'static str, Decoded)> {
     let (format, decoded) = if bytes.starts_with(radiance::MAGIC) {
         ("Radiance HDR", radiance::decode(bytes))
     } else if bytes.starts_with(exr::MAGIC) {
@@ -84,19 +111,12 @@ pub fn parse_environment(bytes: &[u8], path: impl AsRef<Path>) -> Result<Environ
             found: describe(bytes),
         });
     };
-    let refused =
-        |Refused { expected, found }| Error::Format { format, path: path.to_owned(), expected, found };
-    let Decoded { mut raster, is_lat_long } = decoded.map_err(refused)?;
-    if !is_lat_long {
-        check_shape(raster.width(), raster.height()).map_err(refused)?;
-    }
-    for value in raster.pixels_mut().iter_mut().flatten() {
-        // `max` is not used, since it would turn NaN into 0.
-        if *value < 0.0 {
-            *value = 0.0;
-        }
-    }
-    Environment::new(raster).map_err(|error| refused(Refused::new("finite radiance", error.to_string())))
+    Ok((format, decoded.map_err(refused(format, path))?))
+}
+
+/// Turns what is wrong into an error about a file.
+fn refused(format: &'static str, path: &Path) -> impl Fn(Refused) -> Error {
+    move |Refused { expected, found }| Error::Format { format, path: path.to_owned(), expected, found }
 }
 
 /// Whether a file that starts like this may be an environment map. An `OpenEXR` file may hold a table as well.

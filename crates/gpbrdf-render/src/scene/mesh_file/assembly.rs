@@ -7,6 +7,9 @@ use glam::{DVec3, Vec3};
 
 use super::super::mesh::{MAX_TRIANGLES, Mesh, Mismatch, into_unit_sphere};
 
+/// The most triangles without an area that are left out, so that a small file cannot claim work without end.
+const MAX_WITHOUT_AREA: usize = 1 << 24;
+
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
@@ -39,6 +42,10 @@ impl Assembly {
         let [a, b, c] = corners.map(|corner| corner.position);
         if area_normal(a, b, c).is_none() {
             self.without_area += 1;
+            if self.without_area > MAX_WITHOUT_AREA {
+                let expected = format!("at most {MAX_WITHOUT_AREA} triangles without an area");
+                return Err(Mismatch { expected, found: "more".to_owned() });
+            }
             return Ok(());
         }
         if self.indices.len() / 3 >= MAX_TRIANGLES {

@@ -74,8 +74,10 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Mesh> {
     reader.assembly.finish().map_err(refused(FORMAT, path))
 }
 
-/// The JSON and the binary part of a file.
-fn split<'a>(bytes: &'a [u8], path: &Path) -> Result<(Cow<'a, [u8]>, Option<&'a [u8]>)> {
+/// The JSON of a file and its binary part, if it has one.
+type Parts<'a> = (Cow<'a, [u8]>, Option<&'a [u8]>);
+
+fn split<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     if !bytes.starts_with(b"glTF") {
         return Ok((Cow::Borrowed(bytes), None));
     }
@@ -492,6 +494,10 @@ mod tests {
         assert_eq!(read(&document).unwrap(), read(&triangle()).unwrap());
         document["accessors"][0]["count"] = json!(u64::MAX);
         assert_eq!(read(&document).unwrap(), read(&triangle()).unwrap());
+        // Zeros without end are not gone through.
+        document["meshes"][0]["primitives"][0].as_object_mut().unwrap().remove("indices");
+        let message = read(&document).unwrap_err().to_string();
+        assert!(message.contains("triangles without an area, found more"), "{message}");
     }
 
     #[test]

@@ -86,7 +86,7 @@ mod tests {
         for rays in [2u32, 3, 5, 50, 2000] {
             let at = |i: u32| {
                 let angle = std::f64::consts::PI * f64::from(i) / f64::from(rays);
-                let radius = if i % 2 == 0 { 1.0 } else { 0.3 };
+                let radius = if i.is_multiple_of(2) { 1.0 } else { 0.3 };
                 dvec3(radius * angle.cos(), radius * angle.sin(), 0.0)
             };
             let flat: Vec<DVec3> = (0..2 * rays).map(at).collect();
