@@ -83,13 +83,15 @@ fn split<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>> {
     }
     let wrong = |found: String| Error::format(FORMAT, path, "a binary file of version 2 in whole", found);
     let word = |at: usize| bytes.get(at..)?.first_chunk().copied().map(u32::from_le_bytes);
-    match (word(4), word(8)) {
-        (Some(2), Some(length)) if length >= HEADER_BYTES && length as usize <= bytes.len() => {}
+    let whole = match (word(4), word(8)) {
+        (Some(2), Some(length)) if length >= HEADER_BYTES && length as usize <= bytes.len() => {
+            &bytes[..length as usize]
+        }
         (Some(2), Some(length)) => return Err(wrong(format!("{} of {length} bytes", bytes.len()))),
         (Some(version), _) => return Err(wrong(format!("version {version}"))),
         (None, _) => return Err(wrong(format!("{} bytes", bytes.len()))),
-    }
-    let parts = ::gltf::Glb::from_slice(bytes).map_err(|error| wrong(error.to_string()))?;
+    };
+    let parts = ::gltf::Glb::from_slice(whole).map_err(|error| wrong(error.to_string()))?;
     // Both parts are borrowed, as the file is a slice.
     let binary = match parts.bin {
         Some(Cow::Borrowed(binary)) => Some(binary),
