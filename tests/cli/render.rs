@@ -45,7 +45,7 @@ fn wrong_requests_are_refused_and_leave_nothing() {
     cli.write("bad.obj", "v 0 0 0\nf 1 2 3\n");
     cli.write("samples.csv", "");
     for (arguments, part) in [
-        (&["render", "--scene", "torus"][..], "expected sphere, knot, box or an .obj file, found \"torus\""),
+        (&["render", "--scene", "torus"][..], "expected sphere, knot, box or a mesh file, found \"torus\""),
         (&["render", "--scene", "bad.obj"], "OBJ file \"bad.obj\": expected"),
         (&["render", "--scene", "missing.obj"], "cannot read \"missing.obj\""),
         (&["render", "-o", "a.jpg"], "ends in .png or .exr"),

@@ -179,7 +179,6 @@ pub(crate) fn crop(picture: &image::RgbaImage, rect: egui::Rect) -> image::RgbaI
 
 /// Width, height and pixels of an EXR file.
 pub(crate) fn read_exr(path: &Path) -> (usize, usize, Vec<[f32; 3]>) {
-    let picture = gpbrdf_core::formats::read_environment(path).unwrap();
-    let raster = picture.raster();
+    let raster = gpbrdf_core::formats::read_linear_image(path).unwrap();
     (raster.width(), raster.height(), raster.pixels().to_vec())
 }

@@ -147,7 +147,7 @@ fn object_files_and_maps_are_read_and_broken_ones_named() {
         driver.click(item);
         driver.give_path(&path(name), "Load");
     };
-    load(&mut driver, "Shape", "OBJ file…", "corner.obj");
+    load(&mut driver, "Shape", "Mesh file…", "corner.obj");
     driver.wait("the object", |d| measured_samples(d) >= Some(8));
     load(&mut driver, "Light", "Environment map…", "sky.exr");
     driver.click("Light");
@@ -156,7 +156,7 @@ fn object_files_and_maps_are_read_and_broken_ones_named() {
     load(&mut driver, "Light", "Environment map…", "broken.hdr");
     driver.wait("a message", |d| d.shows("broken.hdr\": expected"));
     driver.click("Dismiss");
-    load(&mut driver, "Shape", "OBJ file…", "broken.obj");
+    load(&mut driver, "Shape", "Mesh file…", "broken.obj");
     driver.wait("a message", |d| d.shows("broken.obj"));
     // The sphere is shown in its place, and objects can be chosen again.
     driver.wait("a sphere", |d| d.harness.query_by_label_contains("Sphere view").is_some());

@@ -183,3 +183,40 @@ fn many_errors_all_stay_until_they_are_read() {
     }
     assert!(driver.harness.query_by_label("Show lambert").is_some());
 }
+
+#[test]
+fn files_are_taken_by_what_they_hold_and_sessions_keep_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path().join("here");
+    std::fs::create_dir(&here).unwrap();
+    // Names say nothing.
+    let [sky, mesh, session] = ["sky.dat", "mesh.txt", "session.x"].map(|name| here.join(name));
+    let pixels = [128u8, 128, 128, 129].repeat(8);
+    std::fs::write(&sky, [&b"#?RADIANCE\n\n-Y 2 +X 4\n"[..], &pixels].concat()).unwrap();
+    std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut driver = Driver::new(&[sky, mesh]);
+    driver.fitted();
+    let shown = |driver: &mut Driver, menu: &str, label: &str| {
+        driver.click(menu);
+        driver.wait(label, |d| d.harness.query_by_label(label).is_some());
+        driver.press(Key::Escape);
+    };
+    shown(&mut driver, "Light", "Environment: sky.dat");
+    shown(&mut driver, "Shape", "mesh");
+    driver.press_with_ctrl(Key::S);
+    driver.enter("Path", &session.display().to_string());
+    driver.click("Write");
+    driver.wait("a session", |_| super::driver::exists(&session));
+
+    let there = folder.path().join("there");
+    std::fs::rename(&here, &there).unwrap();
+    let text = std::fs::read_to_string(there.join("session.x")).unwrap();
+    std::fs::write(there.join("session.x"), text.replacen("\"swipe\"", "\"sweep\": 1, \"swipe\"", 1))
+        .unwrap();
+    let mut driver = Driver::new(&[there.join("session.x")]);
+    driver.wait("a note", |d| d.shows("\"sweep\" not known"));
+    driver.fitted();
+    shown(&mut driver, "Light", "Environment: sky.dat");
+    shown(&mut driver, "Shape", "mesh");
+    assert!(!driver.shows("cannot read"), "{:?}", driver.texts());
+}

@@ -76,7 +76,7 @@ pub use scene::display::{Background, Display, Encoding, Show, ToneCurve};
 pub use scene::gbuffer::Geometry;
 pub use scene::light::{EnvironmentLight, Light};
 pub use scene::mesh::{MAX_TRIANGLES, Mesh};
-pub use scene::obj::read_obj;
+pub use scene::mesh_file::{is_mesh, parse_mesh, read_mesh};
 pub use scene::renderer::{LinearPicture, LinearPixel, Renderer};
 pub use scene::shade::{Sampling, ShadingOptions};
 pub use shader::{LOOKUP_WGSL, evaluate_wgsl};

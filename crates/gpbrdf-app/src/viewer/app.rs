@@ -12,12 +12,12 @@ use eframe::egui::{self, CentralPanel, Context, Frame, Panel, Ui};
 use gpbrdf_core::Source;
 
 use super::state::document::{Document, DocumentId, Work};
-use super::state::session::SavedDocument;
+use super::state::session::{SavedDocument, Session};
 use super::state::settings::Settings;
 use super::ui::layout::{self, Panes};
 use super::ui::menu::Menu;
 use super::ui::messages::messages_ui;
-use super::ui::pane::{Command, Offers, Order, Pane, PaneContext, Progress, Start};
+use super::ui::pane::{Command, Offers, Order, Pane, PaneContext, Progress, Shown, Start};
 use super::ui::panes;
 use super::ui::shortcuts::{self, Action};
 use super::ui::status::status_ui;
@@ -35,13 +35,22 @@ struct Opened {
     restore: Option<Box<SavedDocument>>,
 }
 
+/// What a file was found to hold.
+#[derive(Debug)]
+enum Found {
+    Material(Opened),
+    /// A session, and a note about it.
+    Session(Box<Session>, Option<String>),
+    Shown(Shown),
+}
+
 /// What the program is told; panes are told the rest.
 #[derive(Debug)]
 enum Event {
     /// The fitter has news.
     Fit(Report),
     /// A file has been read, or not.
-    Opened(Result<Opened, String>),
+    Found(Result<Found, String>),
     /// A file has been written, or not.
     Saved(Saved),
     /// Paths have been chosen in the dialog of the system.
@@ -77,6 +86,8 @@ pub struct Viewer {
     watcher: Watcher,
     outbox: Outbox<Event>,
     events: Receiver<Event>,
+    /// Files that are being read.
+    reading: usize,
     wake: Waker,
     /// Why the device of the window is gone, once it is.
     lost: Arc<OnceLock<String>>,
@@ -141,7 +152,7 @@ impl Viewer {
         let start = Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()) };
         let open = Question {
             title: "Open materials",
-            help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model or session:",
+            help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model, session, environment map or mesh:",
             access: Access::ReadMany {
                 kind: "Materials",
                 endings: &[
@@ -156,6 +167,10 @@ impl Viewer {
                     "safetensors",
                     "brdf",
                     "json",
+                    "hdr",
+                    "obj",
+                    "glb",
+                    "gltf",
                 ],
             },
             answer: outbox.map(Event::Open),
@@ -170,6 +185,7 @@ impl Viewer {
             watcher,
             outbox,
             events,
+            reading: 0,
             wake,
             lost: Arc::default(),
             pictures: None,
@@ -261,7 +277,7 @@ impl Viewer {
     }
 
     fn has_come_to(&self, progress: Progress) -> bool {
-        let fitted = self.context.documents.iter().all(Document::is_fitted);
+        let fitted = self.reading == 0 && self.context.documents.iter().all(Document::is_fitted);
         fitted && self.panes.iter().all(|pane| pane.progress() >= progress)
     }
 
@@ -308,11 +324,9 @@ impl Viewer {
         while let Ok(event) = self.events.try_recv() {
             match event {
                 Event::Fit(report) => self.take(report),
-                Event::Opened(Ok(opened)) => self.open(opened),
+                Event::Found(found) => self.take_found(found),
                 Event::Saved(Ok(note)) => self.context.messages.note(note),
-                Event::Opened(Err(message)) | Event::Saved(Err(message)) => {
-                    self.context.messages.error(message);
-                }
+                Event::Saved(Err(message)) => self.context.messages.error(message),
                 Event::Browsed((question, paths)) => self.answer(&question, paths),
                 Event::Open(path) => self.open_paths(&[path]),
                 Event::SaveSession(path) => self.save_session(&path),

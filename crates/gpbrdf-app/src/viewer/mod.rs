@@ -12,7 +12,7 @@ mod ui;
 mod work;
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
@@ -27,12 +27,22 @@ pub use state::settings::Settings;
 #[derive(Debug, Parser)]
 #[command(name = "gpbrdf-viewer", version, about, max_term_width = 100)]
 struct Arguments {
-    /// Materials, models and sessions to open: files, or names of built-in materials.
+    /// Materials, models, sessions, environment maps and meshes to open, whichever each file holds, or names of
+    /// built-in materials.
     files: Vec<PathBuf>,
     /// Whether open files of measurements are read again when they change, so that a measurement that is added to one
     /// is fitted at once.
     #[arg(long, value_name = "true|false", default_value_t = true, action = clap::ArgAction::Set)]
     watch: bool,
+}
+
+/// Whether content is a session that the viewer reads; `path` stands for its file.
+///
+/// # Errors
+/// The content is no session, or one of a newer version.
+pub fn check_session(bytes: &[u8], path: impl AsRef<Path>) -> anyhow::Result<()> {
+    let folder = path.as_ref().parent().unwrap_or(Path::new(""));
+    state::session::Session::parse(bytes, folder).map(drop)
 }
 
 /// The viewer in a window of eframe.
@@ -62,7 +72,7 @@ impl eframe::App for Window {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         if let Some(viewer) = &self.viewer {
-            eframe::set_value(storage, SETTINGS, &viewer.settings());
+            viewer.settings().store(storage, SETTINGS);
         }
     }
 
@@ -108,7 +118,7 @@ fn run(arguments: &Arguments, kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Res
         .with_drag_and_drop(true);
     let options = eframe::NativeOptions { viewport, ..eframe::NativeOptions::default() };
     let made = |creation: &eframe::CreationContext<'_>| {
-        let settings = creation.storage.and_then(|s| eframe::get_value(s, SETTINGS)).unwrap_or_default();
+        let settings = creation.storage.map(|s| Settings::load(s, SETTINGS)).unwrap_or_default();
         let viewer = match kept.borrow_mut().take() {
             Some(old) => Viewer::reopened(&creation.egui_ctx, old)?,
             None => {

@@ -86,7 +86,7 @@ impl<'a> Head<'a> {
 const HEAD_BYTES: u64 = 64 << 10;
 
 /// Starts of files that are sometimes mistaken for a measurement, and what to call these files.
-const FOREIGN: [(&[u8], &str); 16] = [
+const FOREIGN: [(&[u8], &str); 22] = [
     (b"\x89PNG\r\n\x1A\n", "a PNG image"),
     (b"\xFF\xD8\xFF", "a JPEG image"),
     (b"GIF8", "a GIF image"),
@@ -94,6 +94,12 @@ const FOREIGN: [(&[u8], &str); 16] = [
     (b"MM\0*", "a TIFF image"),
     (b"#?RADIANCE", "a Radiance HDR image"),
     (b"#?RGBE", "a Radiance HDR image"),
+    (b"PF\n", "a PFM image"),
+    (b"BM", "a BMP image"),
+    (b"RIFF", "a WebP image"),
+    (b"DDS ", "a DDS image"),
+    (b"\xABKTX ", "a KTX image"),
+    (b"glTF", "a glTF mesh"),
     (b"%PDF", "a PDF document"),
     (b"PK\x03\x04", "a ZIP archive"),
     (b"\x1F\x8B", "a gzip archive"),
@@ -104,6 +110,11 @@ const FOREIGN: [(&[u8], &str); 16] = [
     (b"\x93NUMPY", "a NumPy array"),
     (b"\x89HDF\r\n\x1A\n", "an HDF5 file"),
 ];
+
+/// What content is that is often mistaken for something else.
+pub(crate) fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    FOREIGN.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, what)| *what)
+}
 
 /// Recognises the format of a file by its content.
 ///
@@ -138,8 +149,8 @@ fn recognise_head(head: &Head<'_>) -> Result<&'static Format, String> {
     if head.bytes.is_empty() {
         return Err("an empty file".to_owned());
     }
-    if let Some((_, what)) = FOREIGN.iter().find(|(magic, _)| head.bytes.starts_with(magic)) {
-        return Err((*what).to_owned());
+    if let Some(what) = foreign(head.bytes) {
+        return Err(what.to_owned());
     }
     if let Some(found) = FORMATS.into_iter().find(|format| (format.recognises)(head)) {
         return Ok(found);

@@ -18,9 +18,11 @@ pub(crate) mod source;
 mod texture;
 
 pub use checksum::{sha256_file, sha256_hex};
-pub use environment::read_environment;
+pub use environment::{is_environment, parse_environment, read_environment, read_linear_image};
 pub use exr::image::write_image_exr;
-pub use exr::table::{ExrChannels, ExrPart, read_table_exr, write_table_exr, write_table_exr_to};
+pub use exr::table::{
+    ExrChannels, ExrPart, is_table_exr, read_table_exr, write_table_exr, write_table_exr_to,
+};
 pub use format::{Format, recognise};
 pub use measured::cornell::read_cornell;
 pub use measured::text::directions::{Directions, parse_directions_csv, read_directions_csv};

@@ -8,6 +8,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
 use crate::base::raster::Raster;
@@ -89,42 +90,76 @@ impl Environment {
         &self.raster
     }
 
+    /// The map averaged to `columns x rows` pixels, as by [`Environment::average_to`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] when either number is 0.
+    pub fn scaled_to(&self, columns: usize, rows: usize) -> Result<Self> {
+        if columns == 0 || rows == 0 {
+            return Err(Error::argument("environment", "at least one pixel", format!("{columns} x {rows}")));
+        }
+        let across = self.columns_of(columns);
+        let mut pixels = vec![[0.0; 3]; columns * rows];
+        pixels.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
+            let down = self.rows_of(row, rows);
+            for (pixel, spans) in line.iter_mut().zip(&across) {
+                *pixel = narrow(self.mean_over(&down, spans));
+            }
+        });
+        Ok(Self { raster: Raster::new(columns, rows, pixels)? })
+    }
+
     /// The map as `columns x rows` patches, row by row. The radiance of a patch is the mean over its pixels,
     /// weighted by solid angle; a pixel on an edge is shared between patches. The flux
     /// `sum radiance solid_angle` is unchanged.
     #[must_use]
     pub fn average_to(&self, columns: usize, rows: usize) -> Vec<EnvDirection> {
-        let across: Vec<_> = (0..columns).map(|i| overlaps(i, columns, self.raster.width())).collect();
+        let across = self.columns_of(columns);
         let mut patches = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             let (top, bottom) = (row as f64 / rows as f64, (row + 1) as f64 / rows as f64);
             let band = (PI * top).cos() - (PI * bottom).cos();
-            let down: Vec<_> = overlaps(row, rows, self.raster.height())
-                .into_iter()
-                .map(|(y, low, high)| (y, (PI * low).cos() - (PI * high).cos()))
-                .collect();
+            let down = self.rows_of(row, rows);
             for (column, spans) in across.iter().enumerate() {
-                let mut sum = [0.0; 3];
-                let mut total = 0.0;
-                for &(y, weight_y) in &down {
-                    for &(x, low, high) in spans {
-                        let weight = weight_y * (high - low);
-                        total += weight;
-                        let pixel = self.raster.at(x, y);
-                        for c in 0..3 {
-                            sum[c] += weight * f64::from(pixel[c]);
-                        }
-                    }
-                }
                 let u = (column as f64 + 0.5) / columns as f64;
                 patches.push(EnvDirection {
                     direction: lat_long(u, 0.5 * (top + bottom)),
-                    radiance: sum.map(|x| x / total),
+                    radiance: self.mean_over(&down, spans),
                     solid_angle: band * TAU / columns as f64,
                 });
             }
         }
         patches
+    }
+
+    /// The columns of the map that overlap each of `columns`, with both ends of the overlap.
+    fn columns_of(&self, columns: usize) -> Vec<Vec<(usize, f64, f64)>> {
+        (0..columns).map(|i| overlaps(i, columns, self.raster.width())).collect()
+    }
+
+    /// The rows of the map that overlap row `row` of `rows`, with the height of the overlap in `cos t`.
+    fn rows_of(&self, row: usize, rows: usize) -> Vec<(usize, f64)> {
+        overlaps(row, rows, self.raster.height())
+            .into_iter()
+            .map(|(y, low, high)| (y, (PI * low).cos() - (PI * high).cos()))
+            .collect()
+    }
+
+    /// Mean radiance over a patch of rows and columns.
+    fn mean_over(&self, down: &[(usize, f64)], across: &[(usize, f64, f64)]) -> Rgb {
+        let mut sum = [0.0; 3];
+        let mut total = 0.0;
+        for &(y, weight_y) in down {
+            for &(x, low, high) in across {
+                let weight = weight_y * (high - low);
+                total += weight;
+                let pixel = self.raster.at(x, y);
+                for c in 0..3 {
+                    sum[c] += weight * f64::from(pixel[c]);
+                }
+            }
+        }
+        sum.map(|x| x / total)
     }
 }
 
@@ -196,6 +231,11 @@ mod tests {
         }
         assert!(patches.iter().all(|p| (p.direction.norm() - 1.0).abs() < 1e-14));
         assert!(map.average_to(0, 5).is_empty());
+        let small = map.scaled_to(48, 24).unwrap();
+        for (pixel, patch) in small.raster().pixels().iter().zip(&patches) {
+            assert_eq!(*pixel, narrow(patch.radiance));
+        }
+        assert!(map.scaled_to(0, 5).is_err());
     }
 
     #[test]

@@ -8,6 +8,7 @@ use gpbrdf_core::base::Raster;
 use gpbrdf_core::judge::{EnvDirection, POINT_LIGHT};
 
 use super::colour::luminance;
+use crate::context::Context;
 use crate::error::{Error, Result};
 
 /// The one light of a scene. Nothing casts a shadow, and light is reflected once.
@@ -79,7 +80,28 @@ pub struct EnvironmentLight {
     cumulative: Vec<f32>,
 }
 
+/// The most pixels of a map on a device: 8192 x 4096, which take 0.5 GB there.
+const MAX_PIXELS: usize = 1 << 25;
+
 impl EnvironmentLight {
+    /// Prepares a map for a device. Where the device cannot hold it, or where it has more than 2^25 pixels, means over
+    /// 2 x 2, 3 x 3, ... pixels take its place, which keep the flux.
+    ///
+    /// # Errors
+    /// Those of [`Environment::scaled_to`].
+    pub fn for_device(context: &Context, environment: &Environment) -> Result<Self> {
+        let map = environment.raster();
+        let (width, height) = (map.width(), map.height());
+        let limits = context.device().limits();
+        let side = limits.max_texture_dimension_2d as usize;
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let factor = factor_to_fit([width, height], side, bytes);
+        if factor == 1 {
+            return Ok(Self::new(environment));
+        }
+        Ok(Self::new(&environment.scaled_to(width.div_ceil(factor), height.div_ceil(factor))?))
+    }
+
     /// Prepares a map. Directions of a black map are drawn uniformly.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "single precision is the shader's")]
@@ -127,6 +149,21 @@ impl From<&Environment> for EnvironmentLight {
     }
 }
 
+/// How many pixels become one along each axis, so that a map has at most `side` of them along either, at most
+/// [`MAX_PIXELS`] in all, and running shares of at most `bytes`.
+fn factor_to_fit([width, height]: [usize; 2], side: usize, bytes: u64) -> usize {
+    let fits = |columns: usize, rows: usize| {
+        let shares = size_of::<f32>() as u64 * shares_of(columns, rows) as u64;
+        columns.max(rows) <= side && columns * rows <= MAX_PIXELS && shares <= bytes
+    };
+    (1..width.max(height)).find(|&k| fits(width.div_ceil(k), height.div_ceil(k))).unwrap_or(1)
+}
+
+/// Numbers of the running shares of a map.
+fn shares_of(columns: usize, rows: usize) -> usize {
+    rows + 1 + rows * (columns + 1)
+}
+
 /// Running sums from 0, divided by the last one; equal steps where all weights are zero.
 #[expect(clippy::cast_possible_truncation, reason = "single precision is the shader's")]
 fn running_shares(weights: &[f64]) -> Vec<f32> {
@@ -171,7 +208,7 @@ mod tests {
         let (low, high) = ratio.iter().fold((f64::MAX, 0.0f64), |(a, b), &r| (a.min(r), b.max(r)));
         // Within the rounding of the running shares.
         assert!(high / low < 1.02, "{low} {high}");
-        assert_eq!(light.cumulative().len(), 97 + 96 * 193);
+        assert_eq!(light.cumulative().len(), shares_of(192, 96));
     }
 
     #[test]
@@ -182,6 +219,18 @@ mod tests {
         let lamp = EnvironmentLight::new(&Environment::new(map).unwrap());
         assert_eq!(lamp.texels().at(0, 0)[3], 0.0);
         assert!((f64::from(lamp.texels().at(2, 1)[3]) * PI / 2.0 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn large_maps_are_averaged_until_a_device_can_hold_them() {
+        // The smallest binding that is common: 128 MiB, which the shares of 8192 x 4096 pixels exceed by a little.
+        let modest = 128 << 20;
+        assert_eq!(factor_to_fit([4096, 2048], 8192, modest), 1);
+        assert_eq!(factor_to_fit([8192, 4096], 8192, modest), 2);
+        assert_eq!(factor_to_fit([8192, 4096], 16_384, 1 << 31), 1);
+        assert_eq!(factor_to_fit([16_384, 8192], 16_384, 1 << 31), 2);
+        assert_eq!(factor_to_fit([20_001, 3], 2048, modest), 10);
+        assert_eq!(factor_to_fit([1, 1], 2048, modest), 1);
     }
 
     #[test]

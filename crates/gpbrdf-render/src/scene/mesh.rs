@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::f32::consts::{FRAC_PI_4, TAU};
 
-use glam::{Vec3, vec3};
+use glam::{DVec3, Vec3, vec3};
 
 use crate::error::{Error, Result};
 
@@ -22,9 +22,9 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// A mesh of triangles. Where `normals` is empty, smooth ones are computed: at each position the mean of
-    /// the normals of the triangles that meet there, weighted by their angles. Vertices at equal positions
-    /// share it.
+    /// A mesh of triangles. Where `normals` is empty or a normal has no direction, smooth ones are computed: at
+    /// each position the mean of the normals of the triangles that meet there, weighted by their angles. Vertices
+    /// at equal positions share it.
     ///
     /// # Errors
     /// [`gpbrdf_core::Error::InvalidArgument`] when there is no triangle or more than [`MAX_TRIANGLES`], an
@@ -59,9 +59,14 @@ impl Mesh {
             let expected = format!("no normals or {}", mesh.positions.len());
             return Err(wrong(expected, mesh.normals.len().to_string()));
         } else {
-            for normal in &mut mesh.normals {
-                // Normals that have no direction face the viewer.
-                *normal = normal.try_normalize().unwrap_or(Vec3::Z);
+            let mut smooth = Vec::new();
+            for (i, normal) in mesh.normals.iter_mut().enumerate() {
+                *normal = normal.try_normalize().unwrap_or_else(|| {
+                    if smooth.is_empty() {
+                        smooth = smooth_normals(&mesh.positions, &mesh.indices);
+                    }
+                    smooth[i]
+                });
             }
         }
         Ok(mesh)
@@ -71,16 +76,8 @@ impl Mesh {
     /// is at distance 1. A mesh of a single point is only moved.
     #[must_use]
     pub fn fitted(mut self) -> Self {
-        // In f64: the corners of a mesh may be near the largest f32.
-        let wide = |v: &Vec3| v.as_dvec3();
-        let low = self.positions.iter().map(wide).fold(glam::DVec3::INFINITY, |a, b| a.min(b));
-        let high = self.positions.iter().map(wide).fold(glam::DVec3::NEG_INFINITY, |a, b| a.max(b));
-        let middle = 0.5 * (low + high);
-        let radius = self.positions.iter().map(|p| (wide(p) - middle).length()).fold(0.0, f64::max);
-        let scale = if radius > 0.0 { 1.0 / radius } else { 1.0 };
-        for p in &mut self.positions {
-            *p = ((wide(p) - middle) * scale).as_vec3();
-        }
+        let wide: Vec<DVec3> = self.positions.iter().map(|p| p.as_dvec3()).collect();
+        self.positions = into_unit_sphere(&wide);
         self
     }
 
@@ -182,6 +179,17 @@ impl Mesh {
         }
         mesh.fitted()
     }
+}
+
+/// Positions moved and scaled as by [`Mesh::fitted`]. They are in f64, as corners may be near the largest f32 or
+/// close together far from the origin.
+pub(super) fn into_unit_sphere(positions: &[DVec3]) -> Vec<Vec3> {
+    let low = positions.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
+    let high = positions.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
+    let middle = 0.5 * (low + high);
+    let radius = positions.iter().map(|p| (*p - middle).length()).fold(0.0, f64::max);
+    let scale = if radius > 0.0 { 1.0 / radius } else { 1.0 };
+    positions.iter().map(|p| ((*p - middle) * scale).as_vec3()).collect()
 }
 
 /// Why numbers are no mesh.

@@ -6,7 +6,7 @@ pub(crate) mod display;
 pub(crate) mod gbuffer;
 pub(crate) mod light;
 pub(crate) mod mesh;
-pub(crate) mod obj;
+pub(crate) mod mesh_file;
 pub(crate) mod renderer;
 pub(crate) mod sampler;
 pub(crate) mod shade;

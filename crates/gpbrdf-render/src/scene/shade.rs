@@ -83,6 +83,9 @@ const COSINE_SHARE: f32 = 0.3;
 const HARDWARE_BUDGET: u64 = 1 << 21;
 const SOFTWARE_BUDGET: u64 = 1 << 16;
 
+/// Bytes of a map that are handed to the device at a time.
+const BAND_BYTES: usize = 32 << 20;
+
 /// An environment on the device; a black one where the light is of another kind.
 #[derive(Debug)]
 pub(crate) struct EnvironmentBuffers {
@@ -125,12 +128,17 @@ impl EnvironmentBuffers {
                 bytes_per_row: Some(16 * columns),
                 rows_per_image: None,
             };
-            context.queue().write_texture(
-                texture.as_image_copy(),
-                bytemuck::cast_slice(texels.pixels()),
-                layout,
-                size,
-            );
+            // In bands, so that copies of the map stay small.
+            let band = (BAND_BYTES / (16 * width)).max(1);
+            for (i, lines) in texels.pixels().chunks(band * width).enumerate() {
+                // Both are at most the number of rows.
+                let [y, rows] = [i * band, lines.len() / width].map(|n| u32::try_from(n).unwrap_or(0));
+                let mut target = texture.as_image_copy();
+                target.origin.y = y;
+                let extent = wgpu::Extent3d { height: rows, ..size };
+                context.queue().write_texture(target, bytemuck::cast_slice(lines), layout, extent);
+                context.queue().submit([]);
+            }
             texture
         })?;
         let shares =

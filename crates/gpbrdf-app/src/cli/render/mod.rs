@@ -12,8 +12,8 @@ use gpbrdf_core::base::number::significant;
 use gpbrdf_core::judge::{PixelDifference, exposure_of, psnr, ssim};
 use gpbrdf_core::{BrdfTable, Content, Source};
 use gpbrdf_render::{
-    AdapterChoice, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, Mesh, Precision,
-    Projection, Renderer, ShadingOptions, read_obj,
+    AdapterChoice, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light, LinearPicture,
+    Mesh, Precision, Projection, Renderer, ShadingOptions, read_mesh,
 };
 use serde_json::{Value, json};
 
@@ -39,7 +39,7 @@ pub(crate) struct Render {
     /// Picture to write: .png (as shown) or .exr (linear). May be repeated.
     #[arg(short, long, value_name = "FILE", default_value = "render.png")]
     output: Vec<PathBuf>,
-    /// The object: sphere, knot, box, or a Wavefront .obj file.
+    /// The object: sphere, knot, box, or a mesh: Wavefront .obj, glTF .glb or .gltf.
     #[arg(long, value_name = "sphere|knot|box|FILE", default_value = "sphere")]
     scene: PathBuf,
     /// A single light instead of an environment.
@@ -133,7 +133,7 @@ impl Render {
         // Whatever can fail at once comes first.
         let context = Context::open(AdapterChoice::Any)?;
         terminal.detail(&format!("adapter: {}", context.describe()));
-        let mut renderer = self.renderer(&context)?;
+        let mut renderer = self.renderer(&context, terminal)?;
         let source = run.stage(Stage::Load, || open(&self.input, self.reading, terminal))?;
         let materials = self.materials(&source, &mut run)?;
         set_materials(&mut renderer, &context, &source, &materials)?;
@@ -148,12 +148,12 @@ impl Render {
     }
 
     /// A renderer of the scene, without materials.
-    fn renderer(&self, context: &Context) -> Result<Renderer> {
+    fn renderer(&self, context: &Context, terminal: &Terminal) -> Result<Renderer> {
         let mut renderer = Renderer::new(context, self.size)?;
         let (geometry, camera) = self.scene()?;
         renderer.set_geometry(&geometry)?;
         renderer.set_camera(camera)?;
-        renderer.set_light(self.light()?)?;
+        renderer.set_light(self.light(context, terminal)?)?;
         let sampling = self.sampling.into();
         renderer.set_shading(ShadingOptions { sampling, ..ShadingOptions::default() })?;
         Ok(renderer)
@@ -240,13 +240,12 @@ impl Render {
             Some("sphere") => (Geometry::Sphere, [0.0, 0.0]),
             Some("knot") => (Geometry::Mesh(Mesh::knot()), [8.0, -10.0]),
             Some("box") => (Geometry::Mesh(Mesh::rounded_box()), [-33.0, 28.0]),
-            _ if self.scene.exists()
-                || self.scene.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) =>
-            {
-                (Geometry::Mesh(read_obj(&self.scene)?), [0.0, 10.0])
+            // A name with an ending stands for a file, also for one that is missing.
+            _ if self.scene.exists() || self.scene.extension().is_some() => {
+                (Geometry::Mesh(read_mesh(&self.scene)?), [0.0, 10.0])
             }
             _ => bail!(
-                "--scene: expected sphere, knot, box or an .obj file, found \"{}\"",
+                "--scene: expected sphere, knot, box or a mesh file, found \"{}\"",
                 self.scene.display()
             ),
         };
@@ -259,7 +258,7 @@ impl Render {
         Ok((geometry, camera.orbited(azimuth.to_radians(), elevation.to_radians())))
     }
 
-    fn light(&self) -> Result<Light> {
+    fn light(&self, context: &Context, terminal: &Terminal) -> Result<Light> {
         let at = self.light_at.into();
         Ok(match self.light {
             // Irradiance pi: a white Lambertian surface that faces the light has radiance 1.
@@ -269,7 +268,18 @@ impl Render {
             Some(LightName::Point) => Light::Point { position: at, intensity: [std::f32::consts::PI; 3] },
             None => {
                 let file = self.env.as_deref().filter(|path| *path != Path::new("studio"));
-                Light::Environment((&environment(file)?).into())
+                let environment = environment(file)?;
+                let light = EnvironmentLight::for_device(context, &environment)?;
+                let size = |width: usize, height: usize| format!("{width} x {height}");
+                let (given, used) = (environment.raster(), light.texels());
+                if given.width() != used.width() {
+                    terminal.note(&format!(
+                        "the environment map of {} pixels is averaged to {} for the device",
+                        size(given.width(), given.height()),
+                        size(used.width(), used.height())
+                    ));
+                }
+                Light::Environment(light)
             }
         })
     }

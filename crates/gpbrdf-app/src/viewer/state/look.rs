@@ -205,7 +205,7 @@ pub(crate) enum Shape {
     Sphere,
     Knot,
     RoundedBox,
-    /// An OBJ file.
+    /// A file that holds a mesh.
     File(PathBuf),
 }
 

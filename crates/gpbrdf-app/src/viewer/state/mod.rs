@@ -4,5 +4,7 @@ pub(crate) mod document;
 pub(crate) mod documents;
 pub(crate) mod look;
 pub(crate) mod messages;
+pub(crate) mod portable;
 pub(crate) mod session;
 pub(crate) mod settings;
+pub(crate) mod unknown;

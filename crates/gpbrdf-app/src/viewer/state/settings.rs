@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::unknown::unknown_fields;
 
 /// Files kept in the list of recent ones.
 const MAX_RECENT: usize = 12;
@@ -26,6 +29,9 @@ pub struct Settings {
     pub(crate) watch: bool,
     /// What each pane remembers, by the name of the pane.
     pub(crate) panes: BTreeMap<String, serde_json::Value>,
+    /// What the user should know about how the settings were read.
+    #[serde(skip)]
+    pub(crate) notices: Vec<String>,
 }
 
 impl Default for Settings {
@@ -39,11 +45,46 @@ impl Default for Settings {
             tab: None,
             watch: true,
             panes: BTreeMap::new(),
+            notices: Vec::new(),
         }
     }
 }
 
 impl Settings {
+    /// The settings that are kept under `key`: as JSON, or as earlier versions kept them. Fields that are not known,
+    /// and settings that cannot be read, are among the notices.
+    pub(crate) fn load(storage: &dyn eframe::Storage, key: &str) -> Self {
+        let Some(text) = storage.get_string(key) else { return Self::default() };
+        let damaged = |error: &dyn std::fmt::Display| Self {
+            notices: vec![format!(
+                "the settings of the last run cannot be read, and are as at first: {error}"
+            )],
+            ..Self::default()
+        };
+        if !text.trim_start().starts_with('{') {
+            return eframe::get_value(storage, key).unwrap_or_else(|| damaged(&"they are no JSON"));
+        }
+        let read =
+            serde_json::from_str::<Value>(&text).and_then(|given| Ok((Self::deserialize(&given)?, given)));
+        match read {
+            Ok((mut settings, given)) => {
+                let known = serde_json::to_value(&settings).unwrap_or_default();
+                let unknown = unknown_fields(&given, &known);
+                settings.notices.extend(unknown.map(|names| format!("settings: {names}")));
+                settings
+            }
+            Err(error) => damaged(&error),
+        }
+    }
+
+    /// Keeps the settings under `key`.
+    pub(crate) fn store(&self, storage: &mut dyn eframe::Storage, key: &str) {
+        // Settings are plain data, which is always JSON.
+        if let Ok(text) = serde_json::to_string(self) {
+            storage.set_string(key, text);
+        }
+    }
+
     /// Puts a file at the head of the recent ones.
     pub(crate) fn remember(&mut self, path: &Path) {
         self.recent.retain(|p| p != path);
@@ -99,9 +140,27 @@ mod tests {
         settings.panes.insert("3d".to_owned(), serde_json::to_value(&look).unwrap());
         let mut memory = Memory::default();
         eframe::set_value(&mut memory, "settings", &settings);
-        let found: Settings = eframe::get_value(&memory, "settings").unwrap();
+        let found = Settings::load(&memory, "settings");
         assert_eq!(found, settings);
+        settings.store(&mut memory, "settings");
+        assert_eq!(Settings::load(&memory, "settings"), settings);
         assert_eq!(serde_json::from_value::<SceneLook>(found.panes["3d"].clone()).unwrap(), look);
+    }
+
+    #[test]
+    fn what_is_not_known_or_cannot_be_read_is_said() {
+        let load = |text: &str| Settings::load(&Memory(HashMap::from([("s".into(), text.into())])), "s");
+        let found = load("{\"zoom\": 2.0, \"night\": true}");
+        assert_eq!(
+            (found.zoom, found.notices),
+            (2.0, vec!["settings: \"night\" not known, and ignored".to_owned()])
+        );
+        for text in ["{\"zoom\": \"large\"}", "{", "nonsense"] {
+            let found = load(text);
+            assert!(found.notices[0].contains("cannot be read"), "{text} {found:?}");
+            assert_eq!(found.zoom, 1.0);
+        }
+        assert_eq!(Settings::load(&Memory::default(), "s"), Settings::default());
     }
 
     #[test]

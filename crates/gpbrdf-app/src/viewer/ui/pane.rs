@@ -3,6 +3,7 @@
 //! The program calls a pane in each frame in this order: [`Pane::receive`], [`Pane::ui`] where it is shown,
 //! and [`Pane::request`]. Everything else has a default that suits a pane without it.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
@@ -44,6 +45,11 @@ pub(crate) trait Pane {
         Ok(())
     }
 
+    /// Shows what a file holds that is no material; whether this is a pane that does.
+    fn show(&mut self, _file: &Shown) -> bool {
+        false
+    }
+
     /// Takes in what its worker has sent.
     fn receive(&mut self, _ctx: &Context, _cx: &mut PaneContext) {}
 
@@ -73,6 +79,15 @@ pub(crate) trait Pane {
 
     /// Ends threads that must not outlive the window.
     fn close(&mut self) {}
+}
+
+/// A file that holds no material.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Shown {
+    /// An environment map, to light with.
+    Environment(PathBuf),
+    /// A mesh, to be lit.
+    Mesh(PathBuf),
 }
 
 /// Where a pane is shown.

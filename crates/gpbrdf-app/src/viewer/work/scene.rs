@@ -12,7 +12,7 @@ use gpbrdf_core::base::Raster;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
     AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
-    Mesh, Precision, Renderer, Show, read_obj,
+    Mesh, Precision, Renderer, Show, read_mesh,
 };
 
 use super::mailbox::{Mailbox, Sender};
@@ -28,7 +28,7 @@ impl Shape {
             Self::Sphere => Geometry::Sphere,
             Self::Knot => Geometry::Mesh(Mesh::knot()),
             Self::RoundedBox => Geometry::Mesh(Mesh::rounded_box()),
-            Self::File(path) => Geometry::Mesh(read_obj(path).map_err(|error| naming(path, &error))?),
+            Self::File(path) => Geometry::Mesh(read_mesh(path).map_err(|error| naming(path, &error))?),
         })
     }
 }
@@ -257,7 +257,7 @@ impl Scene {
         // A point light moves with the eye.
         let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
         if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
-            renderer.set_light(light(key, &request.environment))?;
+            renderer.set_light(light(&context, key, &request.environment)?)?;
         }
         if renderer.samples() == 0 || changed(&|l| l.exposure == key.exposure) {
             self.picture += 1;
@@ -299,17 +299,17 @@ fn largest_channel(table: &BrdfTable) -> Vec<f32> {
 }
 
 /// The light of a request. A point light keeps its place over the picture while the eye orbits.
-fn light(key: &SceneKey, environment: &Environment) -> Light {
+fn light(context: &Context, key: &SceneKey, environment: &Environment) -> gpbrdf_render::Result<Light> {
     if key.light.point {
         let [x, y] = key.light.at.map(to_f32);
         let view = Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
         let camera = Camera::perspective(0.6, 1.0).orbited(key.orbit.azimuth, key.orbit.elevation);
-        return Light::Directional {
+        return Ok(Light::Directional {
             direction: camera.world_from_view() * view,
             irradiance: [std::f32::consts::PI; 3],
-        };
+        });
     }
-    Light::Environment(EnvironmentLight::new(&turned(environment, key.light.yaw)))
+    Ok(Light::Environment(EnvironmentLight::for_device(context, &turned(environment, key.light.yaw))?))
 }
 
 /// The environment turned about the vertical axis, by whole pixels.

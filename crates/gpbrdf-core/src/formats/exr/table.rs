@@ -191,6 +191,14 @@ pub fn read_table_exr(path: impl AsRef<Path>) -> Result<BrdfTable> {
     read(BufReader::with_capacity(1 << 18, file), path)
 }
 
+/// Whether a file is `OpenEXR` and has a part of the size of a table, as pictures do not.
+#[must_use]
+pub fn is_table_exr(path: impl AsRef<Path>) -> bool {
+    let Ok((file, Some(_))) = open(path.as_ref()) else { return false };
+    let reader = exr::block::read(BufReader::new(file), false);
+    reader.is_ok_and(|reader| reader.headers().iter().any(|header| header.layer_size == Vec2(WIDTH, HEIGHT)))
+}
+
 fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
     let wrong = |expected: &str, found: String| Error::Format {
         format: "OpenEXR",

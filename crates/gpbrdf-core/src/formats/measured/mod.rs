@@ -18,3 +18,4 @@ pub(crate) mod zemax;
 
 pub(crate) use input::Input;
 pub use options::{AngleUnit, ReadOptions, ValueKind, Zenith};
+pub(crate) use spectrum::SRGB_FROM_XYZ;

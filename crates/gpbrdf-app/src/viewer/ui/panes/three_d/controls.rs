@@ -4,7 +4,7 @@ use eframe::egui::Ui;
 
 use super::{Message, ThreeD};
 use crate::viewer::state::look::{Orbit, Shape, SphereLight};
-use crate::viewer::ui::pane::{Order, PaneContext};
+use crate::viewer::ui::pane::{Order, PaneContext, Shown};
 use crate::viewer::ui::widgets::{Number, narrow};
 use crate::viewer::work::dialogs::{Access, Question};
 
@@ -20,12 +20,12 @@ impl ThreeD {
                 self.look.shape = shape;
             }
         }
-        if ui.button("OBJ file…").clicked() {
+        if ui.button("Mesh file…").clicked() {
             cx.order(Order::Ask(Question {
                 title: "Object",
-                help: "A Wavefront OBJ file.",
-                access: Access::Read { kind: "Wavefront OBJ", endings: &["obj"] },
-                answer: self.outbox.map(Message::OpenObject),
+                help: "A Wavefront OBJ or glTF 2.0 file.",
+                access: Access::Read { kind: "Meshes", endings: &["obj", "glb", "gltf"] },
+                answer: self.outbox.map(|path| Message::Open(Shown::Mesh(path))),
             }));
             ui.close();
         }
@@ -54,7 +54,7 @@ impl ThreeD {
                 title: "Environment",
                 help: "A latitude-longitude map, .hdr or .exr.",
                 access: Access::Read { kind: "Environment maps", endings: &["hdr", "exr"] },
-                answer: self.outbox.map(Message::OpenMap),
+                answer: self.outbox.map(|path| Message::Open(Shown::Environment(path))),
             }));
             ui.close();
         }

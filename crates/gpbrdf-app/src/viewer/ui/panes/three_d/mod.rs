@@ -18,7 +18,7 @@ use self::sphere::SphereView;
 use crate::viewer::state::look::{Orbit, SceneLook, Shape, SphereShown};
 use crate::viewer::ui::navigate::{ViewKeys, focus_ui, zoom_factor};
 use crate::viewer::ui::pane::{
-    Command, Offers, Order, Pane, PaneContext, Place, Progress, Share, Slot, Start, restored, saved,
+    Command, Offers, Order, Pane, PaneContext, Place, Progress, Share, Shown, Slot, Start, restored, saved,
 };
 use crate::viewer::ui::widgets::{narrow, segments_ui, tools_menu_ui};
 use crate::viewer::work::dialogs::{Access, Question};
@@ -35,6 +35,9 @@ const OBJECT_HELP: &str = "Object view: drag or arrow keys orbit";
 /// radiances.
 const DIFFERENCE: &str = "prediction - truth, exposed";
 
+/// Columns of an environment; larger ones are averaged.
+const MAX_COLUMNS: usize = 4096;
+
 /// An environment and its file, or why it cannot be read.
 type ReadMap = Result<(PathBuf, Arc<Environment>), String>;
 
@@ -43,10 +46,8 @@ enum Message {
     Sphere(SphereResult),
     Scene(SceneResult),
     Map(ReadMap),
-    /// Read the environment from this file.
-    OpenMap(PathBuf),
-    /// Show the object of this file.
-    OpenObject(PathBuf),
+    /// Show what this file holds.
+    Open(Shown),
     /// Write the spheres to this file.
     Export(PathBuf),
 }
@@ -130,6 +131,17 @@ impl Pane for ThreeD {
         Ok(())
     }
 
+    fn show(&mut self, file: &Shown) -> bool {
+        match file {
+            Shown::Environment(path) => {
+                self.look.light.point = false;
+                self.open_map(path.clone());
+            }
+            Shown::Mesh(path) => self.look.shape = Shape::File(path.clone()),
+        }
+        true
+    }
+
     fn receive(&mut self, ctx: &Context, cx: &mut PaneContext) {
         while let Ok(message) = self.inbox.try_recv() {
             match message {
@@ -148,11 +160,9 @@ impl Pane for ThreeD {
                     self.look.environment = Some(path);
                 }
                 Message::Map(Err(message)) => cx.messages.error(message),
-                Message::OpenMap(path) => {
-                    self.look.light.point = false;
-                    self.open_map(path);
+                Message::Open(file) => {
+                    self.show(&file);
                 }
-                Message::OpenObject(path) => self.look.shape = Shape::File(path),
                 Message::Export(path) => self.export(cx, &path),
             }
         }
@@ -212,8 +222,8 @@ impl ThreeD {
         let outbox = self.outbox.map(Message::Map);
         let cannot = format!("cannot read \"{}\"", path.display());
         in_background(&outbox, "reader", &cannot, move || {
-            let environment = read_environment(&path).map_err(|error| error.to_string())?;
-            Ok((path, Arc::new(environment)))
+            let environment = read_environment(&path).and_then(of_moderate_size);
+            Ok((path, Arc::new(environment.map_err(|error| error.to_string())?)))
         });
     }
 
@@ -259,6 +269,15 @@ impl ThreeD {
             self.look.light.reset();
             (self.look.orbit, self.look.swipe) = (Orbit::default(), 0.5);
         }
+    }
+}
+
+/// An environment of at most [`MAX_COLUMNS`], which is turned anew while the light is dragged.
+fn of_moderate_size(environment: Environment) -> gpbrdf_core::Result<Environment> {
+    let (width, height) = (environment.raster().width(), environment.raster().height());
+    match width.div_ceil(MAX_COLUMNS) {
+        0 | 1 => Ok(environment),
+        factor => environment.scaled_to(width.div_ceil(factor), height.div_ceil(factor)),
     }
 }
 
