@@ -60,6 +60,7 @@ pub mod formats;
 pub mod gp;
 pub mod judge;
 pub mod kernel;
+pub mod material;
 pub mod model;
 #[cfg(feature = "fit")]
 pub mod plan;
@@ -80,6 +81,7 @@ pub use gp::{FitReport, Noise, Outliers};
 pub use gp::{Hyper, Solver};
 pub use judge::{Environment, Metrics};
 pub use kernel::Shape;
+pub use material::{Material, MaterialOptions, SampledDirection};
 pub use model::{Baked, IntervalOf, Intervals, Model, Prediction, bake_mean, bake_sigma};
 #[cfg(feature = "fit")]
 pub use model::{CompressOptions, Fit, FitOptions, InducingSize, compress, condition, fit};

@@ -1,5 +1,5 @@
 //! Utilities without a subject of their own: errors, files written whole, grids of pixels, random numbers,
-//! vector instructions, half precision, linear algebra, numbers for people, observers of long work.
+//! vector instructions, fast arctangents, half precision, linear algebra, numbers for people, observers of long work.
 
 pub(crate) mod atomic_file;
 pub(crate) mod error;
@@ -10,6 +10,7 @@ pub(crate) mod random;
 pub(crate) mod raster;
 pub(crate) mod simd;
 pub(crate) mod tensor_file;
+pub(crate) mod trigonometry;
 pub(crate) mod watch;
 
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
