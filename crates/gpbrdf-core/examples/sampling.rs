@@ -103,7 +103,9 @@ impl Ggx {
             let wo = [theta.sin(), 0.0, theta.cos()];
             let albedo = luminance(material.albedo(wo));
             for _ in 0..FIT_SAMPLES {
-                let Some(sample) = material.sample(wo, unit(&mut random), unit(&mut random)) else { continue };
+                let Some(sample) = material.sample(wo, unit(&mut random), unit(&mut random)) else {
+                    continue;
+                };
                 let value = luminance(sample.weight) / albedo;
                 drawn.push((sample.wi, wo, value * value * f64::from(sample.pdf)));
             }
@@ -135,7 +137,12 @@ fn unit(random: &mut SplitMix64) -> f32 {
 
 impl Sampler<'_> {
     /// A direction and `f cos / pdf`.
-    fn draw(&self, material: &Material, wo: Direction, random: &mut SplitMix64) -> Option<(Direction, [f32; 3])> {
+    fn draw(
+        &self,
+        material: &Material,
+        wo: Direction,
+        random: &mut SplitMix64,
+    ) -> Option<(Direction, [f32; 3])> {
         let (u, v) = (unit(random), unit(random));
         let (wi, pdf) = match self {
             Self::Own(material) => return material.sample(wo, u, v).map(|drawn| (drawn.wi, drawn.weight)),
@@ -250,7 +257,9 @@ fn main() -> Result<()> {
     } else {
         files.iter().map(Source::open).collect::<Result<_>>()?
     };
-    println!("| material | cosine | fitted GGX | own density | own / cosine | own / GGX | 99.9 % of weights | largest |");
+    println!(
+        "| material | cosine | fitted GGX | own density | own / cosine | own / GGX | 99.9 % of weights | largest |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     let frames = pixels();
     let mut ratios = Vec::new();

@@ -29,6 +29,11 @@ pub trait Brdf: Send + Sync {
     /// frame (normal +z). Zero in every channel when either direction is at or below the horizon.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb;
 
+    /// The BRDF as it was measured, where this one is made reciprocal from it; `None` otherwise.
+    fn as_measured(&self) -> Option<&dyn Brdf> {
+        None
+    }
+
     /// `f` at half-difference angles; by default evaluated with the half vector above the x axis.
     fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
         let (wi, wo) = angles.to_directions();
@@ -65,6 +70,10 @@ impl<B: Brdf> Brdf for Reciprocal<B> {
         let forward = self.inner.eval(&a, &b);
         let backward = self.inner.eval(&b, &a);
         std::array::from_fn(|c| 0.5 * (forward[c] + backward[c]))
+    }
+
+    fn as_measured(&self) -> Option<&dyn Brdf> {
+        Some(&self.inner)
     }
 }
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::brdf::LUMINANCE_WEIGHTS;
 use crate::material::density::{
-    COLUMNS, DirectionDensities, ROWS, VIEWS, row_node, view_between, view_cosine,
+    COLUMNS, DirectionDensities, ROWS, VIEWS, column_node, row_node, view_between, view_cosine,
 };
 use crate::material::half_vector::HalfVectorSquare;
 use crate::material::lookup::{interpolate, positions};
@@ -36,10 +36,12 @@ type Transport = Vec<Vec<[f64; 3]>>;
 
 impl Reflected {
     pub(crate) fn new(values: &[[f32; 3]], energy_conserving: bool) -> Self {
-        let transport: Transport = (0..ALBEDO_VIEWS).into_par_iter().map(|k| from_elevation(values, k)).collect();
+        let transport: Transport =
+            (0..ALBEDO_VIEWS).into_par_iter().map(|k| from_elevation(values, k)).collect();
         let factors = if energy_conserving { conserving_factors(&transport) } else { None };
         let factor = |k: usize| factors.as_ref().map_or(1.0, |f| f[k]);
-        let albedos = (0..ALBEDO_VIEWS).map(|k| scaled(&transport[k], &factor).map(|x| narrow(x * factor(k))));
+        let albedos =
+            (0..ALBEDO_VIEWS).map(|k| scaled(&transport[k], &factor).map(|x| narrow(x * factor(k))));
         let albedos = albedos.collect();
         Self { albedos, factors: factors.map(|f| f.into_iter().map(narrow).collect()) }
     }
@@ -123,7 +125,8 @@ fn from_elevation(values: &[[f32; 3]], k: usize) -> Vec<[f64; 3]> {
         for i in 0..columns {
             let column = (i as f32 + 0.5) / columns as f32;
             for side in [-1.0, 1.0] {
-                let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) else {
+                let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side)
+                else {
                     continue;
                 };
                 // Half of the square belongs to either side.
@@ -181,7 +184,7 @@ fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<
         let (j, x) = (along / CELL_POINTS, within(along % CELL_POINTS));
         let (i, b) = (across / CELL_POINTS, within(across % CELL_POINTS));
         let row = row_node(j) + (row_node(j + 1) - row_node(j)) * x;
-        let column = (i as f32 + b) / (COLUMNS - 1) as f32;
+        let column = column_node(i) + (column_node(i + 1) - column_node(i)) * b;
         let mut value = 0.0;
         for side in [-1.0, 1.0] {
             if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {

@@ -47,7 +47,11 @@ pub(crate) fn positions<const N: usize>(wi: &Lanes<N>, wo: &Lanes<N>) -> Lanes<N
 
 /// The integer part of a position and the rest.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positions are small and not negative")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "positions are small and not negative"
+)]
 fn split(position: f32) -> (usize, f32) {
     let low = position as u32;
     (low as usize, position - low as f32)
