@@ -7,7 +7,7 @@ pub(crate) mod sigma;
 pub(crate) mod table;
 
 pub use angles::{BoxPoint, GRAZING_COSINE, HORIZON_COSINE, HalfDiff, direction, fold_phi_d, theta_d_max};
-pub use materials::{Material, material, materials};
+pub use materials::{BuiltInMaterial, material, materials};
 pub use sigma::SigmaTable;
 pub use table::{
     BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, Trilinear, cell_center, cell_index,
