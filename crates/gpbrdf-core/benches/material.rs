@@ -13,9 +13,9 @@ use gpbrdf_core::{Brdf, BrdfTable, Material, MaterialOptions};
 /// Pairs of directions of one measurement: their cells do not fit the smaller caches.
 const PAIRS: usize = 1 << 16;
 
-/// The nearest cell: `theta_h = acos h_z`, `theta_d = acos d_z` and `phi_d = atan2(d_y, d_x)`, where `d` is `wi` turned by
-/// `Ry(-theta_h) Rz(-phi_h)`, and truncated indices (W. Matusik et al., "A Data-Driven Reflectance Model", 2003; angles of
-/// S. Rusinkiewicz, 1998).
+/// The nearest cell: `theta_h = acos h_z`, `theta_d = acos d_z` and `phi_d = atan2(d_y, d_x)`, where `d` is `wi`
+/// turned by `Ry(-theta_h) Rz(-phi_h)`, and truncated indices (W. Matusik et al., "A Data-Driven Reflectance Model",
+/// 2003; angles of S. Rusinkiewicz, 1998).
 fn nearest_cell(table: &BrdfTable, wi: [f32; 3], wo: [f32; 3]) -> [f32; 3] {
     let (wi, wo) = (wi.map(f64::from), wo.map(f64::from));
     let sum: [f64; 3] = std::array::from_fn(|k| wi[k] + wo[k]);

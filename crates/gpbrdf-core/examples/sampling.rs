@@ -1,5 +1,5 @@
-//! Error of a sphere lit by a small bright lamp in a dim room, at equal samples, for three ways to draw directions: by the
-//! cosine, by a GGX lobe fitted to the material and the cosine, and by the material's own densities.
+//! Error of a sphere lit by a small bright lamp in a dim room, at equal samples, for three ways to draw directions: by
+//! the cosine, by a GGX lobe fitted to the material and the cosine, and by the material's own densities.
 //!
 //! ```sh
 //! cargo run --release -p gpbrdf-core --example sampling -- FILE...
@@ -14,10 +14,10 @@ use gpbrdf_core::{Material, MaterialOptions, Result, Source};
 
 /// Samples of each pixel.
 const SAMPLES: usize = 64;
-/// Pixels along each side of the picture.
-const SIZE: usize = 64;
-/// Direction to the lamp: x right, y up, z towards the viewer. Normalised where it is used.
-const LAMP: [f32; 3] = [0.5, 0.7, 0.6];
+/// Pixels along each side of a picture.
+const SIZE: usize = 48;
+/// Directions to the lamp in three pictures: x right, y up, z towards the viewer. Normalised where they are used.
+const LAMPS: [[f32; 3]; 3] = [[0.3, 0.4, 0.9], [0.5, 0.7, 0.3], [0.6, 0.5, -0.6]];
 /// Cosine of the lamp's angular radius, 4 degrees.
 const LAMP_COSINE: f32 = 0.997_564;
 /// Radiance of the lamp and of the room.
@@ -178,8 +178,8 @@ impl Frame {
     }
 }
 
-fn radiance(w: Direction) -> f32 {
-    if dot(w, normalize(LAMP)) > LAMP_COSINE { RADIANCE[0] } else { RADIANCE[1] }
+fn radiance(w: Direction, lamp: Direction) -> f32 {
+    if dot(w, normalize(lamp)) > LAMP_COSINE { RADIANCE[0] } else { RADIANCE[1] }
 }
 
 /// The pixels of a sphere seen from `+z`: their frames.
@@ -192,9 +192,9 @@ fn pixels() -> Vec<Frame> {
 }
 
 /// What a pixel reflects: the room by the albedo, the lamp by points spread evenly over its disc.
-fn reference(material: &Material, frame: &Frame) -> [f64; 3] {
+fn reference(material: &Material, frame: &Frame, lamp: Direction) -> [f64; 3] {
     let wo = frame.local([0.0, 0.0, 1.0]);
-    let lamp = Frame::new(normalize(LAMP));
+    let lamp = Frame::new(normalize(lamp));
     let mut sum = material.albedo(wo).map(|a| f64::from(a * RADIANCE[1]));
     let (rings, spokes) = (32, 64);
     let solid_angle = std::f32::consts::TAU * (1.0 - LAMP_COSINE) / (rings * spokes) as f32;
@@ -212,23 +212,25 @@ fn reference(material: &Material, frame: &Frame) -> [f64; 3] {
     sum
 }
 
-/// Root mean square error of the luminance over the sphere.
-fn error(sampler: &Sampler<'_>, material: &Material, frames: &[Frame], truth: &[[f64; 3]]) -> f64 {
+/// Root mean square error of the luminance over the spheres, one for each lamp.
+fn error(sampler: &Sampler<'_>, material: &Material, frames: &[Frame], truth: &[Vec<[f64; 3]>]) -> f64 {
     let mut random = SplitMix64::new(17);
     let mut sum = 0.0;
-    for (frame, truth) in frames.iter().zip(truth) {
-        let wo = frame.local([0.0, 0.0, 1.0]);
-        let mut found = [0.0; 3];
-        for _ in 0..SAMPLES {
-            if let Some((wi, weight)) = sampler.draw(material, wo, &mut random) {
-                let light = radiance(frame.world(wi)) / SAMPLES as f32;
-                (0..3).for_each(|c| found[c] += f64::from(weight[c] * light));
+    for (lamp, truth) in LAMPS.iter().zip(truth) {
+        for (frame, truth) in frames.iter().zip(truth) {
+            let wo = frame.local([0.0, 0.0, 1.0]);
+            let mut found = [0.0; 3];
+            for _ in 0..SAMPLES {
+                if let Some((wi, weight)) = sampler.draw(material, wo, &mut random) {
+                    let light = radiance(frame.world(wi), *lamp) / SAMPLES as f32;
+                    (0..3).for_each(|c| found[c] += f64::from(weight[c] * light));
+                }
             }
+            let difference: f64 = (0..3).map(|c| LUMINANCE_WEIGHTS[c] * (found[c] - truth[c])).sum();
+            sum += difference * difference;
         }
-        let difference: f64 = (0..3).map(|c| LUMINANCE_WEIGHTS[c] * (found[c] - truth[c])).sum();
-        sum += difference * difference;
     }
-    (sum / frames.len() as f64).sqrt()
+    (sum / (LAMPS.len() * frames.len()) as f64).sqrt()
 }
 
 /// The weight that 99.9 % of samples stay below and the largest, in units of the albedo, at the worst of many views.
@@ -257,30 +259,33 @@ fn main() -> Result<()> {
     } else {
         files.iter().map(Source::open).collect::<Result<_>>()?
     };
-    println!(
-        "| material | cosine | fitted GGX | own density | own / cosine | own / GGX | 99.9 % of weights | largest |"
-    );
+    let columns = "own / cosine | own / GGX | 99.9 % of weights | largest";
+    println!("| material | cosine | fitted GGX | own density | {columns} |");
     println!("|---|---|---|---|---|---|---|---|");
     let frames = pixels();
-    let mut ratios = Vec::new();
+    let (mut ratios, mut errors) = (Vec::new(), Vec::new());
     for source in &sources {
         let material = source.material(&MaterialOptions::default())?;
-        let truth: Vec<_> = frames.iter().map(|frame| reference(&material, frame)).collect();
+        let seen = |lamp| frames.iter().map(|frame| reference(&material, frame, lamp)).collect();
+        let truth: Vec<Vec<_>> = LAMPS.into_iter().map(seen).collect();
         let ggx = Ggx::fitted(&material);
         let of = |sampler: Sampler<'_>| error(&sampler, &material, &frames, &truth);
         let (cosine, fitted, own) = (of(Sampler::Cosine), of(Sampler::Ggx(ggx)), of(Sampler::Own(&material)));
         let (most, largest) = largest_weights(&material);
+        let lobe = format!("alpha {:.3}, share {:.1}", ggx.alpha, ggx.share);
         println!(
-            "| {} | {cosine:.4} | {fitted:.4} (alpha {:.3}, share {:.1}) | {own:.4} | {:.2} | {:.2} | {most:.2} | {largest:.2} |",
+            "| {} | {cosine:.4} | {fitted:.4} ({lobe}) | {own:.4} | {:.2} | {:.2} | {most:.2} | {largest:.2} |",
             source.name,
-            ggx.alpha,
-            ggx.share,
             own / cosine,
             own / fitted
         );
         ratios.push([own / cosine, own / fitted]);
+        errors.push([cosine, fitted, own]);
     }
-    let mean = |k: usize| ratios.iter().map(|r| r[k]).sum::<f64>() / ratios.len() as f64;
-    println!("| mean | | | | {:.2} | {:.2} | | |", mean(0), mean(1));
+    let count = sources.len() as f64;
+    let mean = |k: usize| ratios.iter().map(|r: &[f64; 2]| r[k]).sum::<f64>() / count;
+    let [cosine, fitted, own] =
+        [0, 1, 2].map(|k| errors.iter().map(|e: &[f64; 3]| e[k]).sum::<f64>() / count);
+    println!("| mean | {cosine:.4} | {fitted:.4} | {own:.4} | {:.2} | {:.2} | | |", mean(0), mean(1));
     Ok(())
 }

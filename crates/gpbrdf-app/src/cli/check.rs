@@ -20,7 +20,8 @@ pub(crate) struct Check {
     #[arg(long)]
     energy_conserving: bool,
     /// Directions drawn at each elevation to test the sampling.
-    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(1000..=100_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1000..=100_000_000))]
     samples: u32,
     /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]

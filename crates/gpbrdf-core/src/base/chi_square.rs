@@ -11,9 +11,9 @@ pub struct ChiSquare {
     pub p_value: f64,
 }
 
-/// Tests counts against expected counts. Bins in which fewer than `least` are expected are pooled with their successors in
-/// the order of their expectations until `least` are; what is left at the end joins the last pool. Expectations are scaled
-/// to the sum of the observations.
+/// Tests counts against expected counts. Bins in which fewer than `least` are expected are pooled with their
+/// successors in the order of their expectations until `least` are; what is left at the end joins the last pool.
+/// Expectations are scaled to the sum of the observations.
 ///
 /// Source: K. Pearson (1900); the bound of 5 that is usual for `least` is W. G. Cochran's (1952).
 #[must_use]

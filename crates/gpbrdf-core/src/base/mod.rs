@@ -1,5 +1,6 @@
 //! Utilities without a subject of their own: errors, files written whole, grids of pixels, random numbers,
-//! a test of counts, vector instructions, fast arctangents, half precision, linear algebra, numbers for people, observers of long work.
+//! a test of counts, vector instructions, fast arctangents, half precision, linear algebra, numbers for people,
+//! observers of long work.
 
 pub(crate) mod atomic_file;
 pub(crate) mod chi_square;

@@ -21,8 +21,8 @@ const ARCTANGENT: [f64; 8] = [
 /// [`ARCTANGENT`] in single precision.
 const ARCTANGENT_F32: [f32; 8] = narrow(ARCTANGENT);
 
-/// 4.4.46: `arccos(x) / sqrt(1 - x)` as a polynomial in `x`, highest power first, to an absolute error of `arccos` of at
-/// most 2e-8 for `x` in `[0, 1]`.
+/// 4.4.46: `arccos(x) / sqrt(1 - x)` as a polynomial in `x`, highest power first, to an absolute error of `arccos` of
+/// at most 2e-8 for `x` in `[0, 1]`.
 const ARCCOSINE: [f32; 8] = narrow([
     -0.001_262_491_1,
     0.006_670_090_1,

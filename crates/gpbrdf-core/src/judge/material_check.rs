@@ -1,5 +1,5 @@
-//! Whether a material is one that a renderer can rely on: reciprocal, positive, without gaps, not brighter than its light,
-//! and sampled as its density says.
+//! Whether a material is one that a renderer can rely on: reciprocal, positive, without gaps, not brighter than its
+//! light, and sampled as its density says.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -58,8 +58,8 @@ impl Default for CheckOptions {
     }
 }
 
-/// Relative differences `|f(wi, wo) - f(wo, wi)| / ((f(wi, wo) + f(wo, wi)) / 2 + 0.001)` of the channel in which they are
-/// largest, over random pairs with both cosines above 0.08.
+/// Relative differences `|f(wi, wo) - f(wo, wi)| / ((f(wi, wo) + f(wo, wi)) / 2 + 0.001)` of the channel in which they
+/// are largest, over random pairs with both cosines above 0.08.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Reciprocity {
     /// The largest.

@@ -30,8 +30,8 @@ pub(crate) struct Reflected {
 }
 
 /// The transport between two elevations for each channel: `kernel[k][m]` is the integral of `f cos theta_i` over the
-/// incident directions about elevation `m`, seen from elevation `k`, where an incident direction between two elevations is
-/// shared by both.
+/// incident directions about elevation `m`, seen from elevation `k`, where an incident direction between two
+/// elevations is shared by both.
 type Transport = Vec<Vec<[f64; 3]>>;
 
 impl Reflected {
@@ -89,9 +89,9 @@ fn scaled(row: &[[f64; 3]], factor: &impl Fn(usize) -> f64) -> [f64; 3] {
 
 /// Factors `s` of at most 1 with `s_k sum_m kernel_km s_m <= 1` in every channel; `None` where all are 1.
 ///
-/// Where the largest albedo of a channel, `B_k = sum_m kernel_km s_m`, is too large, `s_k` goes to the geometric mean of
-/// itself and `1 / B_k`, as in the scaling of matrices by R. Sinkhorn and P. Knopp (1967); at the fixed point the albedo
-/// there is exactly 1.
+/// Where the largest albedo of a channel, `B_k = sum_m kernel_km s_m`, is too large, `s_k` goes to the geometric mean
+/// of itself and `1 / B_k`, as in the scaling of matrices by R. Sinkhorn and P. Knopp (1967); at the fixed point the
+/// albedo there is exactly 1.
 fn conserving_factors(transport: &Transport) -> Option<Vec<f64>> {
     let mut factors = vec![1.0; ALBEDO_VIEWS];
     let largest = |factors: &[f64], k: usize| {

@@ -10,10 +10,10 @@ pub const COLUMNS: usize = 24;
 /// Densities on the unit square at [`VIEWS`] elevations of the outgoing direction, bilinear between [`ROWS`] x
 /// [`COLUMNS`] nodes, with what is needed to sample them. Between two elevations the density is a mixture of both.
 ///
-/// Node `(j, i)` of a square is at `y = (j / (ROWS - 1))^4` and `b = 1 - (1 - i / (COLUMNS - 1))^2`; what `y` and `b` mean is told at
-/// [`Material`](super::Material). Elevation `k` has `cos theta_o = v (2 - v)` with `v = (1 - k / (VIEWS - 1))^2`: the
-/// normal is first, and elevations crowd towards the horizon. All arrays are flat, so they can be handed to a device as
-/// they are. Together they take 1.0 MB.
+/// Node `(j, i)` of a square is at `y = (j / (ROWS - 1))^4` and `b = 1 - (1 - i / (COLUMNS - 1))^2`; what `y` and `b`
+/// mean is told at [`Material`](super::Material). Elevation `k` has `cos theta_o = v (2 - v)` with `v = (1 - k /
+/// (VIEWS - 1))^2`: the normal is first, and elevations crowd towards the horizon. All arrays are flat, so they can be
+/// handed to a device as they are. Together they take 1.0 MB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionDensities {
     values: Vec<f32>,
@@ -50,7 +50,8 @@ pub(crate) fn view_position(cosine: f32, nodes: usize) -> f32 {
     (nodes - 1) as f32 * (1.0 - v.sqrt())
 }
 
-/// The cosine of elevation `index` of `nodes`: the inverse of [`view_position`]. The last is slightly above the horizon.
+/// The cosine of elevation `index` of `nodes`: the inverse of [`view_position`]. The last is slightly above the
+/// horizon.
 pub(crate) fn view_cosine(index: usize, nodes: usize) -> f32 {
     let t = 1.0 - index as f32 / (nodes - 1) as f32;
     let v = t * t;
@@ -96,8 +97,8 @@ fn search(count: usize, target: f32, sum: impl Fn(usize) -> f32) -> usize {
 const SQUARE: usize = ROWS * COLUMNS;
 
 impl DirectionDensities {
-    /// Densities that are proportional to `values` at the nodes, `VIEWS x ROWS x COLUMNS` of them, none negative. A square
-    /// of zeros becomes uniform.
+    /// Densities that are proportional to `values` at the nodes, `VIEWS x ROWS x COLUMNS` of them, none negative. A
+    /// square of zeros becomes uniform.
     pub(crate) fn new(mut values: Vec<f32>) -> Self {
         let mut conditional = vec![0.0; values.len()];
         let mut marginal = vec![0.0; VIEWS * ROWS];
@@ -129,8 +130,8 @@ impl DirectionDensities {
         &self.conditional
     }
 
-    /// Integrals of each square over the columns and from the first row to each row: `VIEWS` times `ROWS` numbers from 0
-    /// to 1.
+    /// Integrals of each square over the columns and from the first row to each row: `VIEWS` times `ROWS` numbers from
+    /// 0 to 1.
     #[must_use]
     pub fn marginal(&self) -> &[f32] {
         &self.marginal

@@ -6,11 +6,11 @@ use crate::base::trigonometry::{acos, atan2_upper, sin_cos_upper};
 /// The map between a unit square, taken twice, and all incident directions above the horizon, for one outgoing
 /// direction.
 ///
-/// A direction `wi` stands for its half vector `h` with the polar angle `theta_h` and the azimuth `p` against `wo`; both
-/// sides of the plane of incidence, `p` and `-p`, share one square. With `z = 1 - cos theta_h`, the row coordinate is
-/// `y = z / (1 - c z)` with `c = 1 / z_max - 1`, where `z_max` belongs to the largest `theta_h = pi/4 + theta_o / 2` at
-/// which any `wi` is above the horizon. So `y` is nearly `z` in the lobe about the normal at every view, and fills
-/// `[0, 1]`. The column coordinate is `b = |p| / p_max` in `[0, 1]`: `wi` is above the horizon while
+/// A direction `wi` stands for its half vector `h` with the polar angle `theta_h` and the azimuth `p` against `wo`;
+/// both sides of the plane of incidence, `p` and `-p`, share one square. With `z = 1 - cos theta_h`, the row
+/// coordinate is `y = z / (1 - c z)` with `c = 1 / z_max - 1`, where `z_max` belongs to the largest `theta_h = pi/4 +
+/// theta_o / 2` at which any `wi` is above the horizon. So `y` is nearly `z` in the lobe about the normal at every
+/// view, and fills `[0, 1]`. The column coordinate is `b = |p| / p_max` in `[0, 1]`: `wi` is above the horizon while
 /// `cos p > -cot theta_o cot 2 theta_h`, which gives `p_max` in closed form.
 ///
 /// A density `rho` on the square means the density over solid angle

@@ -28,18 +28,18 @@ pub const COSINE_SHARE: f32 = 0.1;
 /// What a [`Material`] is made to be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MaterialOptions {
-    /// Whether no more light may leave the surface than falls on it. Where the albedo of a table is larger than 1, `f` is
-    /// multiplied by `s(theta_i) s(theta_o)`, a factor of at most 1 that is the same for all channels, so `f` stays
+    /// Whether no more light may leave the surface than falls on it. Where the albedo of a table is larger than 1, `f`
+    /// is multiplied by `s(theta_i) s(theta_o)`, a factor of at most 1 that is the same for all channels, so `f` stays
     /// reciprocal and keeps its hue; what is dark enough stays as it is.
     pub energy_conserving: bool,
 }
 
 /// An isotropic material that a renderer evaluates and samples.
 ///
-/// Directions are unit vectors in the local frame, whose normal is `+z`; `wi` points to the light and `wo` to the viewer.
-/// `f` is the BRDF in sr^-1, **without** the cosine, from a table in half-difference angles by trilinear interpolation;
-/// cells without data are filled from their neighbours ([`BrdfTable::filled`]). Such a table is reciprocal by
-/// construction, `f(wi, wo) = f(wo, wi)`, and so is the material.
+/// Directions are unit vectors in the local frame, whose normal is `+z`; `wi` points to the light and `wo` to the
+/// viewer. `f` is the BRDF in sr^-1, **without** the cosine, from a table in half-difference angles by trilinear
+/// interpolation; cells without data are filled from their neighbours ([`BrdfTable::filled`]). Such a table is
+/// reciprocal by construction, `f(wi, wo) = f(wo, wi)`, and so is the material.
 ///
 /// Sampling follows `luminance(f) cos theta_i` of the table itself. At each of 64 elevations of `wo`, densities are
 /// bilinear between 80 x 24 nodes over half vectors ([`DirectionDensities`]), in coordinates in which a lobe keeps its
@@ -49,8 +49,8 @@ pub struct MaterialOptions {
 ///
 /// The coordinates of a square, with `z = 1 - cos theta_h` and `p` the azimuth of the half vector against `wo`:
 /// `y = z / (1 - c z)` along rows, where `c = 1 / z_max - 1` and `z_max = 1 - cos(pi/4 + theta_o / 2)`, and
-/// `b = |p| / p_max` along columns, where `cos p_max = -cot theta_o cot 2 theta_h`, clamped to `[-1, 1]`. A density `rho` on
-/// the square is `rho (1 + c y)^2 / (8 p_max wo.h)` over solid angle.
+/// `b = |p| / p_max` along columns, where `cos p_max = -cot theta_o cot 2 theta_h`, clamped to `[-1, 1]`. A density
+/// `rho` on the square is `rho (1 + c y)^2 / (8 p_max wo.h)` over solid angle.
 ///
 /// Single precision throughout; no call allocates. 17.5 MB for the table and 1.0 MB for sampling.
 ///
@@ -176,8 +176,8 @@ impl Material {
         Some(SampledDirection { wi, weight: f.map(|f| f * scale), pdf })
     }
 
-    /// The density, sr^-1, with which [`Material::sample`] draws `wi` for this `wo`. Zero where either direction is at or
-    /// below the horizon.
+    /// The density, sr^-1, with which [`Material::sample`] draws `wi` for this `wo`. Zero where either direction is at
+    /// or below the horizon.
     #[inline]
     #[must_use]
     pub fn pdf(&self, wi: [f32; 3], wo: [f32; 3]) -> f32 {
@@ -276,8 +276,8 @@ impl Material {
         self.reflected.albedos()
     }
 
-    /// The factors `s` of an energy-conserving material at the elevations of [`Material::albedos`]; `None` where `f` is that
-    /// of the table.
+    /// The factors `s` of an energy-conserving material at the elevations of [`Material::albedos`]; `None` where `f`
+    /// is that of the table.
     #[must_use]
     pub fn conserving_factors(&self) -> Option<&[f32]> {
         self.reflected.factors()

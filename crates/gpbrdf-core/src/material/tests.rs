@@ -115,7 +115,8 @@ fn the_density_is_that_of_the_samples() {
     }
 }
 
-/// The integral of `f cos theta_i` by the midpoint rule over `theta_i` and `phi_i`, which knows nothing of half vectors.
+/// The integral of `f cos theta_i` by the midpoint rule over `theta_i` and `phi_i`, which knows nothing of half
+/// vectors.
 fn brute_force_albedo(material: &Material, wo: [f32; 3]) -> [f64; 3] {
     let (rows, columns) = (600, 600);
     let mut sum = [0.0; 3];
