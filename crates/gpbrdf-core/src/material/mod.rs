@@ -301,8 +301,7 @@ fn cosine_direction(u: f32, v: f32, side: f32) -> [f32; 3] {
 /// A number within `[0, 1)`; NaN becomes 0.
 #[inline(always)]
 fn unit(u: f32) -> f32 {
-    // max comes before min, so that NaN becomes 0.
-    u.max(0.0).min(1.0 - f32::EPSILON / 2.0)
+    if u > 0.0 { u.min(1.0 - f32::EPSILON / 2.0) } else { 0.0 }
 }
 
 #[cfg(test)]
