@@ -28,6 +28,7 @@ fn nearest_cell(table: &BrdfTable, wi: [f32; 3], wo: [f32; 3]) -> [f32; 3] {
     let d = [cos_t * turned[0] + sin_t * turned[2], turned[1], cos_t * turned[2] - sin_t * turned[0]];
     let (theta_d, phi_d) = (d[2].clamp(-1.0, 1.0).acos(), d[1].atan2(d[0]));
     let phi_d = if phi_d < 0.0 { phi_d + PI } else { phi_d };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "fractions are not negative")]
     let index = |t: f64, n: usize| ((t * n as f64) as usize).min(n - 1);
     table.values()[cell_index(
         index((theta_h / FRAC_PI_2).max(0.0).sqrt(), 90),

@@ -246,8 +246,8 @@ fn largest_weights(material: &Material) -> (f64, f64) {
             .map(|drawn| luminance(drawn.weight) / albedo)
             .collect();
         weights.sort_by(f64::total_cmp);
-        let at = |share: f64| weights.get((weights.len() as f64 * share) as usize).copied().unwrap_or(0.0);
-        worst = (worst.0.max(at(0.999)), worst.1.max(weights.last().copied().unwrap_or(0.0)));
+        let most = weights.get(weights.len() * 999 / 1000).copied().unwrap_or(0.0);
+        worst = (worst.0.max(most), worst.1.max(weights.last().copied().unwrap_or(0.0)));
     }
     worst
 }
