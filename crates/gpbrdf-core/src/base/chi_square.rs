@@ -147,7 +147,7 @@ mod tests {
             for (count, level) in below.iter_mut().zip([0.1, 0.5, 0.9]) {
                 *count += usize::from(test.p_value < level);
             }
-            observed[30] += 130.0;
+            observed[30] += 250.0;
             assert!(chi_square(&observed, &expected, 5.0).p_value < 1e-3);
         }
         for (count, level) in below.iter().zip([0.1, 0.5, 0.9]) {

@@ -65,7 +65,7 @@ pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     half.copysign(y)
 }
 
-/// `atan2(y, x)` in `[0, pi]` for `y >= 0`, with an error of at most 3e-7 and, for `x >= 0`, a relative one of as much;
+/// `atan2(y, x)` in `[0, pi]` for `y >= 0`, with an error of at most 5e-7 and, for `x >= 0`, a relative one of as much;
 /// 0 where both arguments are 0.
 #[inline(always)]
 pub(crate) fn atan2_upper(y: f32, x: f32) -> f32 {
@@ -84,7 +84,7 @@ pub(crate) fn atan2_upper(y: f32, x: f32) -> f32 {
     if x < 0.0 { PI - quadrant } else { quadrant }
 }
 
-/// `acos(x)` for `x` in `[-1, 1]`, with an error of at most 3e-7.
+/// `acos(x)` for `x` in `[-1, 1]`, with an error of at most 5e-7, two units in the last place of `pi`.
 #[inline(always)]
 pub(crate) fn acos(x: f32) -> f32 {
     let a = x.abs();
@@ -96,7 +96,7 @@ pub(crate) fn acos(x: f32) -> f32 {
     if x < 0.0 { PI - quadrant } else { quadrant }
 }
 
-/// `(sin(x), cos(x))` for `x` in `[0, pi]`, with an error of at most 2e-7.
+/// `(sin(x), cos(x))` for `x` in `[0, pi]`, with an error of at most 3e-7.
 ///
 /// Taylor's polynomials of degrees 11 and 12 about `pi/2`; what they leave out is at most 6e-8.
 #[inline(always)]
@@ -125,17 +125,17 @@ mod tests {
         for i in 0..=200_000 {
             let x = -1.0 + i as f32 / 100_000.0;
             let exact = f64::from(x).acos();
-            assert!((f64::from(acos(x)) - exact).abs() < 3e-7, "acos {x}");
+            assert!((f64::from(acos(x)) - exact).abs() < 5e-7, "acos {x}");
             let angle = i as f32 / 200_000.0 * PI;
             let (sine, cosine) = sin_cos_upper(angle);
             let exact = f64::from(angle).sin_cos();
-            assert!((f64::from(sine) - exact.0).abs() < 2e-7, "sin {angle}");
-            assert!((f64::from(cosine) - exact.1).abs() < 2e-7, "cos {angle}");
+            assert!((f64::from(sine) - exact.0).abs() < 3e-7, "sin {angle}");
+            assert!((f64::from(cosine) - exact.1).abs() < 3e-7, "cos {angle}");
             for radius in [1e-6, 0.3, 2.0] {
                 let (y, x) = (radius * angle.sin().max(0.0), radius * angle.cos());
                 let exact = f64::from(y).atan2(f64::from(x));
                 let error = (f64::from(atan2_upper(y, x)) - exact).abs();
-                assert!(error < 3e-7 && (x < 0.0 || error < 3e-7 * exact.max(1e-30)), "atan2 {y} {x}");
+                assert!(error < 5e-7 && (x < 0.0 || error < 5e-7 * exact.max(1e-30)), "atan2 {y} {x}");
                 assert!((atan2(f64::from(y), f64::from(x)) - exact).abs() < 5e-8);
                 assert!((atan2(f64::from(-y), f64::from(x)) + exact).abs() < 5e-8);
             }
