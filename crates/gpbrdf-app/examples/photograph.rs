@@ -11,6 +11,10 @@ use eframe::egui;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use gpbrdf_app::viewer::{Settings, Viewer};
+use gpbrdf_core::formats::write_samples_csv;
+use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, plan};
+use gpbrdf_core::prior::Prior;
+use gpbrdf_core::{Sample, SampleSet, Source};
 
 type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
@@ -20,6 +24,8 @@ struct Scene {
     /// Size of the window in points, and pixels per point.
     size: [f32; 2],
     scale: f32,
+    /// Whether the open material is a file of twenty measurements in planned directions.
+    is_measured: bool,
     /// What the viewer would remember from an earlier run; the rest is as at first.
     settings: &'static str,
     /// The label of what the pointer is on.
@@ -32,12 +38,13 @@ const PLAIN: Scene = Scene {
     name: "viewer-overview",
     size: [1360.0, 850.0],
     scale: 1.0,
+    is_measured: false,
     settings: "{}",
     hovered: None,
     converges: Duration::ZERO,
 };
 
-const SCENES: [Scene; 5] = [
+const SCENES: [Scene; 6] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
@@ -56,6 +63,7 @@ const SCENES: [Scene; 5] = [
         converges: Duration::from_secs(5),
         ..PLAIN
     },
+    Scene { name: "viewer-directions", is_measured: true, settings: r#"{"view": "directions"}"#, ..PLAIN },
     Scene { name: "viewer-large-text", size: [800.0, 500.0], scale: 2.0, ..PLAIN },
 ];
 
@@ -84,6 +92,12 @@ fn main() -> Result {
 
 fn photograph(scene: &Scene, file: &Path) -> Result {
     let settings: Settings = serde_json::from_str(scene.settings)?;
+    let folder = tempfile::tempdir()?;
+    let mut files = Vec::new();
+    if scene.is_measured {
+        files.push(folder.path().join("rough-copper.csv"));
+        write_samples_csv(&files[0], &planned_measurements("cook-torrance", 20)?)?;
+    }
     let mut first_error = None;
     let mut harness = Harness::builder()
         .with_size(scene.size)
@@ -93,7 +107,7 @@ fn photograph(scene: &Scene, file: &Path) -> Result {
         .build_ui_state(
             move |ui, viewer: &mut Option<Viewer>| {
                 if viewer.is_none() && first_error.is_none() {
-                    match Viewer::new(ui.ctx(), settings.clone(), &[]) {
+                    match Viewer::new(ui.ctx(), settings.clone(), &files) {
                         Ok(made) => *viewer = Some(made),
                         Err(error) => first_error = Some(error),
                     }
@@ -125,6 +139,21 @@ fn photograph(scene: &Scene, file: &Path) -> Result {
         viewer.close();
     }
     Ok(())
+}
+
+/// A built-in material at the directions that are planned before anything is known of it.
+fn planned_measurements(name: &str, count: usize) -> Result<SampleSet> {
+    let source = Source::built_in(name)?;
+    let brdf = source.brdf()?;
+    let candidates = Device::default().geometries(MOST_CANDIDATES)?;
+    let belief = Belief::before(Some(&Prior::built_in()));
+    let cells = Cells::warped_box(Cells::COUNT)?;
+    let planned = plan(&belief, &[], &candidates, &cells, Goal::Count(count))?;
+    let sample = |geometry: &Geometry| {
+        let [wi, wo] = geometry.directions();
+        Sample { wi, wo, value: brdf.eval(&wi, &wo) }
+    };
+    Ok(planned.geometries.iter().map(sample).collect())
 }
 
 /// Frames until `done`.

@@ -38,7 +38,7 @@
 //! - **Device**: [`Context`] opens one, or works on a device that your program has opened.
 //! - **Texture**: [`Baker`] writes a model to a [`BrdfTexture`]; [`BrdfTexture::upload`] takes a table.
 //! - **Your own shaders**: [`LOOKUP_WGSL`] turns two directions into a value of the texture. [`translate`]
-//!   has it in GLSL, HLSL, MSL and SPIR-V, [`evaluate`] runs it.
+//!   has it in GLSL, HLSL, MSL and SPIR-V, [`evaluate`] runs it. [`MATERIAL_WGSL`] draws directions, too.
 //! - **Pictures**: a [`Renderer`] lights a [`Geometry`] by a [`Light`] as a [`Camera`] sees it, with one
 //!   material or with a truth and a prediction. It shows them by a [`Display`], or returns a
 //!   [`LinearPicture`].
@@ -53,6 +53,7 @@ mod context;
 mod error;
 mod gpu_types;
 mod lookup;
+mod material;
 mod readback;
 mod scene;
 mod shader;
@@ -71,6 +72,7 @@ pub use bake::{Baker, Progress};
 pub use context::{AdapterChoice, Context};
 pub use error::{Error, Result};
 pub use lookup::{ShaderLanguage, evaluate, translate};
+pub use material::density_buffer;
 pub use scene::camera::{Camera, Projection};
 pub use scene::display::{Background, Display, Encoding, Show, ToneCurve};
 pub use scene::gbuffer::Geometry;
@@ -79,7 +81,7 @@ pub use scene::mesh::{MAX_TRIANGLES, Mesh};
 pub use scene::mesh_file::{is_mesh, parse_mesh, read_mesh};
 pub use scene::renderer::{LinearPicture, LinearPixel, Renderer};
 pub use scene::shade::{Sampling, ShadingOptions};
-pub use shader::{LOOKUP_WGSL, evaluate_wgsl};
+pub use shader::{LOOKUP_WGSL, MATERIAL_WGSL, evaluate_wgsl};
 pub use texture::{BrdfTexture, Precision};
 
 /// The shading of scenes again on the CPU, in f64, and the surfaces that the device shades.

@@ -40,6 +40,28 @@ pub const LOOKUP_WGSL: &str = concat!(
     include_str!("../shaders/shared/angles.wgsl")
 );
 
+/// [`LOOKUP_WGSL`] and the functions `gpbrdf_eval(table, wi, wo)`, `gpbrdf_sample(table, wo, u)` and
+/// `gpbrdf_pdf(wi, wo)`, which do what [`Material`](gpbrdf_core::Material) does. The text needs one more function,
+/// which reads the buffer of [`density_buffer`](crate::density_buffer):
+///
+/// ```wgsl
+/// @group(0) @binding(1) var<storage, read> densities: array<f32>;
+///
+/// fn gpbrdf_density(index: u32) -> f32 {
+///     return densities[index];
+/// }
+/// ```
+///
+/// All its names begin with `gpbrdf_`, `Gpbrdf` or `GPBRDF_`. An energy-conserving material is one whose table is baked
+/// so: its factors are not applied.
+pub const MATERIAL_WGSL: &str = concat!(
+    include_str!("../shaders/shared/table.wgsl"),
+    "\n",
+    include_str!("../shaders/shared/angles.wgsl"),
+    "\n",
+    include_str!("../shaders/shared/directions.wgsl")
+);
+
 /// How the shaders of scenes read materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lookup {

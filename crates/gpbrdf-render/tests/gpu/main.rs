@@ -5,6 +5,7 @@
 mod bake;
 mod fixtures;
 mod golden;
+mod material;
 mod scene;
 #[path = "../support/mod.rs"]
 mod support;
