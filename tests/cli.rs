@@ -6,6 +6,7 @@ mod harness;
 mod cli {
     mod bake;
     mod broken_files;
+    mod check;
     mod commands;
     mod dense;
     mod device;

@@ -21,6 +21,27 @@
 //! # }
 //! ```
 //!
+//! A renderer turns a table, a model or a source into a [`Material`]:
+//!
+//! - [`Material::eval`]: `f(wi, wo)` in sr^-1, without the cosine;
+//! - [`Material::sample`]: a direction with its density and `f cos / pdf`;
+//! - [`Material::pdf`]: the density of a direction;
+//! - [`Material::albedo`]: the directional-hemispherical reflectance.
+//!
+//! ```
+//! use gpbrdf_core::{BrdfTable, Material, MaterialOptions};
+//!
+//! # fn main() -> gpbrdf_core::Result<()> {
+//! let table = BrdfTable::from_fn(|angles| [0.1 + (-40.0 * angles.theta_h.powi(2)).exp(); 3]); // or baked, or read
+//! let material = Material::new(table, &MaterialOptions::default())?;
+//! let wo = [0.6, 0.0, 0.8];
+//! if let Some(drawn) = material.sample(wo, 0.3, 0.7) {
+//!     assert!(material.pdf(drawn.wi, wo) > 0.0 && drawn.weight[0] < 2.0 * material.albedo(wo)[0]);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! The names that most users need are exported here. The modules hold everything else; they follow the flow
 //! of data:
 //!
@@ -35,6 +56,7 @@
 //! - [`model`]: [`fit`](fit()) finds hyper-parameters by maximum marginal likelihood. A [`Model`] predicts
 //!   means and intervals, implements [`Brdf`], and is saved and loaded bit for bit. [`Baked`] holds its
 //!   values in all 1,458,000 cells of a table.
+//! - [`material`]: a [`Material`] is what a renderer calls, in single precision and without allocations.
 //! - [`prior`]: what other materials tell. `plan` (with the feature `fit`): what to measure next.
 //! - [`judge`], [`figure`]: metrics against a truth, and pictures for people.
 //!
@@ -60,6 +82,7 @@ pub mod formats;
 pub mod gp;
 pub mod judge;
 pub mod kernel;
+pub mod material;
 pub mod model;
 #[cfg(feature = "fit")]
 pub mod plan;
@@ -80,6 +103,7 @@ pub use gp::{FitReport, Noise, Outliers};
 pub use gp::{Hyper, Solver};
 pub use judge::{Environment, Metrics};
 pub use kernel::Shape;
+pub use material::{Material, MaterialOptions, SampledDirection};
 pub use model::{Baked, IntervalOf, Intervals, Model, Prediction, bake_mean, bake_sigma};
 #[cfg(feature = "fit")]
 pub use model::{CompressOptions, Fit, FitOptions, InducingSize, compress, condition, fit};

@@ -1,6 +1,7 @@
 //! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
 mod bake;
+mod check;
 mod convert;
 mod eval;
 mod fit;
@@ -59,6 +60,8 @@ enum Command {
     Predict(predict::Predict),
     /// Compare a prediction with a truth.
     Eval(eval::Eval),
+    /// Whether a renderer can rely on a material: reciprocity, energy, gaps, sampling.
+    Check(check::Check),
     /// A picture of a BRDF at one phi_d.
     Slice(slice::SliceCommand),
     /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
@@ -101,6 +104,7 @@ pub fn main() -> ExitCode {
         Command::Plan(command) => command.run(&terminal),
         Command::Predict(command) => command.run(&terminal),
         Command::Eval(command) => command.run(&terminal),
+        Command::Check(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
         Command::Render(command) => command.run(&terminal),
         Command::Learn(command) => command.run(&terminal),

@@ -10,7 +10,7 @@ use crate::brdf::{Brdf, Rgb};
 
 /// A material that needs no file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
+pub struct BuiltInMaterial {
     /// The name by which [`material`] finds it, lower case with hyphens.
     pub name: &'static str,
     /// The name to show.
@@ -23,7 +23,7 @@ pub struct Material {
     pub brdf: AnalyticBrdf,
 }
 
-impl Brdf for Material {
+impl Brdf for BuiltInMaterial {
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb {
         self.brdf.eval(wi, wo)
     }
@@ -32,7 +32,7 @@ impl Brdf for Material {
 /// All built-in materials: seven reconstructions from published fits, then one material for each other
 /// analytic model.
 #[must_use]
-pub fn materials() -> &'static [Material] {
+pub fn materials() -> &'static [BuiltInMaterial] {
     &MATERIALS
 }
 
@@ -40,7 +40,7 @@ pub fn materials() -> &'static [Material] {
 ///
 /// # Errors
 /// [`Error::UnknownName`], which lists the names that exist.
-pub fn material(name: &str) -> Result<&'static Material> {
+pub fn material(name: &str) -> Result<&'static BuiltInMaterial> {
     MATERIALS.iter().find(|m| m.name == name).ok_or_else(|| Error::UnknownName {
         kind: "built-in material",
         name: name.to_owned(),
@@ -51,64 +51,64 @@ pub fn material(name: &str) -> Result<&'static Material> {
 const SGD_FITS: &str = "M. M. Bagher, C. Soler, N. Holzschuch, \"Accurate Fitting of Measured Reflectances Using \
                         a Shifted Gamma Micro-facet Distribution\", 2012: published parameters";
 
-static MATERIALS: [Material; 14] = [
-    Material {
+static MATERIALS: [BuiltInMaterial; 14] = [
+    BuiltInMaterial {
         name: "cherry-235",
         title: "Cherry 235",
         description: "glossy varnished cherry wood: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(CHERRY_235),
     },
-    Material {
+    BuiltInMaterial {
         name: "red-plastic",
         title: "Red plastic",
         description: "red plastic: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(RED_PLASTIC),
     },
-    Material {
+    BuiltInMaterial {
         name: "purple-paint",
         title: "Purple paint",
         description: "glossy purple paint: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(PURPLE_PAINT),
     },
-    Material {
+    BuiltInMaterial {
         name: "blue-rubber",
         title: "Blue rubber",
         description: "dull blue rubber: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(BLUE_RUBBER),
     },
-    Material {
+    BuiltInMaterial {
         name: "blue-metallic-paint",
         title: "Blue metallic paint",
         description: "blue metallic paint: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(BLUE_METALLIC_PAINT),
     },
-    Material {
+    BuiltInMaterial {
         name: "silver-paint",
         title: "Silver paint",
         description: "silver paint: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(SILVER_PAINT),
     },
-    Material {
+    BuiltInMaterial {
         name: "violet-rubber",
         title: "Violet rubber",
         description: "violet rubber: reconstruction from the published SGD fit",
         source: SGD_FITS,
         brdf: AnalyticBrdf::Sgd(VIOLET_RUBBER),
     },
-    Material {
+    BuiltInMaterial {
         name: "lambert",
         title: "Plaster (Lambert)",
         description: "warm white plaster: analytic model, parameters chosen here",
         source: "J. H. Lambert, \"Photometria\", 1760",
         brdf: AnalyticBrdf::Lambert(Lambert { albedo: [0.80, 0.75, 0.68] }),
     },
-    Material {
+    BuiltInMaterial {
         name: "phong",
         title: "Orange plastic (Phong)",
         description: "orange plastic: analytic model, parameters chosen here",
@@ -120,7 +120,7 @@ static MATERIALS: [Material; 14] = [
             exponent: 60.0,
         }),
     },
-    Material {
+    BuiltInMaterial {
         name: "blinn-phong",
         title: "Teal enamel (Blinn-Phong)",
         description: "teal enamel: analytic model, parameters chosen here",
@@ -131,7 +131,7 @@ static MATERIALS: [Material; 14] = [
             exponent: 400.0,
         }),
     },
-    Material {
+    BuiltInMaterial {
         name: "ward",
         title: "Satin varnish (Ward)",
         description: "wood under satin varnish: analytic model, parameters chosen here",
@@ -143,7 +143,7 @@ static MATERIALS: [Material; 14] = [
             alpha_y: 0.14,
         }),
     },
-    Material {
+    BuiltInMaterial {
         name: "ashikhmin-shirley",
         title: "Green lacquer (Ashikhmin-Shirley)",
         description: "green lacquer, equal exponents: analytic model, parameters chosen here",
@@ -155,7 +155,7 @@ static MATERIALS: [Material; 14] = [
             exponent_v: 150.0,
         }),
     },
-    Material {
+    BuiltInMaterial {
         name: "blinn",
         title: "Glazed ceramic (Blinn)",
         description: "pale blue glazed ceramic: analytic model, parameters chosen here",
@@ -167,7 +167,7 @@ static MATERIALS: [Material; 14] = [
             ior: [1.5, 1.5, 1.5],
         }),
     },
-    Material {
+    BuiltInMaterial {
         name: "cook-torrance",
         title: "Rough copper (Cook-Torrance)",
         description: "rough copper: analytic model, parameters chosen here",

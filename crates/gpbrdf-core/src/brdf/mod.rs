@@ -7,7 +7,7 @@ pub(crate) mod sigma;
 pub(crate) mod table;
 
 pub use angles::{BoxPoint, GRAZING_COSINE, HORIZON_COSINE, HalfDiff, direction, fold_phi_d, theta_d_max};
-pub use materials::{Material, material, materials};
+pub use materials::{BuiltInMaterial, material, materials};
 pub use sigma::SigmaTable;
 pub use table::{
     BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, SLAB, Trilinear, cell_center, cell_index,
@@ -28,6 +28,11 @@ pub trait Brdf: Send + Sync {
     /// `f(wi, wo)` in sr^-1, without the cosine. Both are unit directions away from the surface, in the local
     /// frame (normal +z). Zero in every channel when either direction is at or below the horizon.
     fn eval(&self, wi: &Vector3<f64>, wo: &Vector3<f64>) -> Rgb;
+
+    /// The BRDF as it was measured, where this one is made reciprocal from it; `None` otherwise.
+    fn as_measured(&self) -> Option<&dyn Brdf> {
+        None
+    }
 
     /// `f` at half-difference angles; by default evaluated with the half vector above the x axis.
     fn eval_half_diff(&self, angles: HalfDiff) -> Rgb {
@@ -65,6 +70,10 @@ impl<B: Brdf> Brdf for Reciprocal<B> {
         let forward = self.inner.eval(&a, &b);
         let backward = self.inner.eval(&b, &a);
         std::array::from_fn(|c| 0.5 * (forward[c] + backward[c]))
+    }
+
+    fn as_measured(&self) -> Option<&dyn Brdf> {
+        Some(&self.inner)
     }
 }
 

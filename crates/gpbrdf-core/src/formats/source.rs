@@ -11,6 +11,7 @@ use crate::formats::format::{Reader, recognise_bytes};
 use crate::formats::measured::{Input, ReadOptions};
 use crate::formats::read::{open, read_bytes};
 use crate::formats::{merl_material_name, recognise, sha256_file, sha256_hex};
+use crate::material::{Material, MaterialOptions};
 use crate::model::Model;
 use crate::model::bake::bake_mean;
 use crate::sample::{Layout, Provenance, SampleSet};
@@ -194,6 +195,14 @@ impl Source {
             Content::Model(model) => Ok(Cow::Owned(bake_mean(model))),
             Content::Samples(_) => Err(self.scattered()),
         }
+    }
+
+    /// The source as a material that a renderer evaluates and samples.
+    ///
+    /// # Errors
+    /// [`Error::Unsuitable`] for scattered samples, and those of [`Material::new`].
+    pub fn material(&self, options: &MaterialOptions) -> Result<Material> {
+        Material::new(self.table()?.into_owned(), options)
     }
 
     /// The error for scattered samples where a BRDF is needed.

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use crate::base::error::{Error, Result};
 use crate::base::raster::Raster;
+use crate::base::trigonometry::atan2;
 use crate::brdf::Rgb;
 use crate::brdf::angles::GRAZING_COSINE;
 use crate::brdf::angles::HalfDiff;
@@ -234,33 +235,6 @@ fn half_diff(wi: &Vector3<f64>, wo: &Vector3<f64>) -> HalfDiff {
     let folded = if azimuth < 0.0 { azimuth + PI } else { azimuth };
     let phi_d = if theta_d < 1e-12 || folded >= PI { 0.0 } else { folded };
     HalfDiff { theta_h: theta_h.min(FRAC_PI_2), theta_d: theta_d.min(FRAC_PI_2), phi_d }
-}
-
-/// `atan2` with an error of at most 5e-8. Source: M. Abramowitz and I. Stegun, "Handbook of Mathematical
-/// Functions" (1964), 4.4.49, whose relative error is at most 2e-8 on `[0, 1]`, continued by symmetry.
-fn atan2(y: f64, x: f64) -> f64 {
-    const COEFFICIENTS: [f64; 8] = [
-        0.002_866_225_7,
-        -0.016_165_736_7,
-        0.042_909_613_8,
-        -0.075_289_640_0,
-        0.106_562_639_3,
-        -0.142_088_994_4,
-        0.199_935_508_5,
-        -0.333_331_452_8,
-    ];
-    let (ax, ay) = (x.abs(), y.abs());
-    let large = ax.max(ay);
-    if !(large > 0.0) {
-        return 0.0;
-    }
-    let t = ax.min(ay) / large;
-    let s = t * t;
-    let poly = COEFFICIENTS.iter().fold(0.0, |sum, c| (sum + c) * s);
-    let octant = t + t * poly;
-    let quadrant = if ay > ax { FRAC_PI_2 - octant } else { octant };
-    let half = if x < 0.0 { PI - quadrant } else { quadrant };
-    half.copysign(y)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of an image")]

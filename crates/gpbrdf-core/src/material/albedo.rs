@@ -1,0 +1,211 @@
+//! How much light a material reflects at each elevation, and the densities of what it reflects.
+
+use rayon::prelude::*;
+
+use crate::brdf::LUMINANCE_WEIGHTS;
+use crate::material::density::{
+    COLUMNS, DirectionDensities, ROWS, VIEWS, column_node, row_node, view_between, view_cosine,
+};
+use crate::material::half_vector::HalfVectorSquare;
+use crate::material::lookup::{interpolate, positions};
+
+/// Number of elevations at which albedos are held.
+pub const ALBEDO_VIEWS: usize = 128;
+
+/// Points along the rows and the columns of the square over which an albedo is integrated.
+const QUADRATURE: [usize; 2] = [192, 64];
+
+/// Points along each side of a cell whose values make those of its nodes.
+const CELL_POINTS: usize = 2;
+
+/// Rounds in which the factors of an energy-conserving material are found. The last one is followed by a scaling that
+/// makes the bound hold whatever is left.
+const ROUNDS: usize = 40;
+
+/// Albedos, and the factors that keep them at or below 1 where that is wanted, at [`ALBEDO_VIEWS`] elevations.
+#[derive(Clone, Debug)]
+pub(crate) struct Reflected {
+    albedos: Vec<[f32; 3]>,
+    factors: Option<Vec<f32>>,
+}
+
+/// The transport between two elevations for each channel: `kernel[k][m]` is the integral of `f cos theta_i` over the
+/// incident directions about elevation `m`, seen from elevation `k`, where an incident direction between two
+/// elevations is shared by both.
+type Transport = Vec<Vec<[f64; 3]>>;
+
+impl Reflected {
+    pub(crate) fn new(values: &[[f32; 3]], energy_conserving: bool) -> Self {
+        let transport: Transport =
+            (0..ALBEDO_VIEWS).into_par_iter().map(|k| from_elevation(values, k)).collect();
+        let factors = if energy_conserving { conserving_factors(&transport) } else { None };
+        let factor = |k: usize| factors.as_ref().map_or(1.0, |f| f[k]);
+        let albedos =
+            (0..ALBEDO_VIEWS).map(|k| scaled(&transport[k], &factor).map(|x| narrow(x * factor(k))));
+        let albedos = albedos.collect();
+        Self { albedos, factors: factors.map(|f| f.into_iter().map(narrow).collect()) }
+    }
+
+    pub(crate) fn albedos(&self) -> &[[f32; 3]] {
+        &self.albedos
+    }
+
+    pub(crate) fn factors(&self) -> Option<&[f32]> {
+        self.factors.as_deref()
+    }
+
+    /// Albedo at a cosine of `theta_o`.
+    #[inline]
+    pub(crate) fn albedo(&self, cosine: f32) -> [f32; 3] {
+        let (k, t) = view_between(cosine, ALBEDO_VIEWS);
+        let (a, b) = (self.albedos[k], self.albedos[k + 1]);
+        std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
+    }
+
+    /// The value of the table at two cosines, scaled where energy is to be conserved.
+    #[inline(always)]
+    pub(crate) fn conserve(&self, f: [f32; 3], cosine_i: f32, cosine_o: f32) -> [f32; 3] {
+        let Some(factors) = &self.factors else { return f };
+        let scale = factor_at(factors, cosine_i) * factor_at(factors, cosine_o);
+        f.map(|f| f * scale)
+    }
+}
+
+/// A factor between elevations.
+#[inline]
+fn factor_at(factors: &[f32], cosine: f32) -> f32 {
+    let (k, t) = view_between(cosine, ALBEDO_VIEWS);
+    factors[k] + (factors[k + 1] - factors[k]) * t
+}
+
+/// The sum of a row of the transport, each elevation with its factor.
+fn scaled(row: &[[f64; 3]], factor: &impl Fn(usize) -> f64) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for (m, reflected) in row.iter().enumerate() {
+        (0..3).for_each(|c| sum[c] += reflected[c] * factor(m));
+    }
+    sum
+}
+
+/// Factors `s` of at most 1 with `s_k sum_m kernel_km s_m <= 1` in every channel; `None` where all are 1.
+///
+/// Where the largest albedo of a channel, `B_k = sum_m kernel_km s_m`, is too large, `s_k` goes to the geometric mean
+/// of itself and `1 / B_k`, as in the scaling of matrices by R. Sinkhorn and P. Knopp (1967); at the fixed point the
+/// albedo there is exactly 1.
+fn conserving_factors(transport: &Transport) -> Option<Vec<f64>> {
+    let mut factors = vec![1.0; ALBEDO_VIEWS];
+    let largest = |factors: &[f64], k: usize| {
+        let sums = scaled(&transport[k], &|m| factors[m]);
+        sums.into_iter().fold(0.0, f64::max)
+    };
+    if (0..ALBEDO_VIEWS).all(|k| largest(&factors, k) <= 1.0) {
+        return None;
+    }
+    for _ in 0..ROUNDS {
+        factors = (0..ALBEDO_VIEWS)
+            .map(|k| (factors[k] * (1.0 / largest(&factors, k).max(f64::MIN_POSITIVE)).min(1.0)).sqrt())
+            .collect();
+    }
+    let excess = (0..ALBEDO_VIEWS).map(|k| factors[k] * largest(&factors, k)).fold(1.0, f64::max);
+    factors.iter_mut().for_each(|factor| *factor /= excess.sqrt());
+    Some(factors)
+}
+
+/// A row of the transport, by the midpoint rule on the square of half vectors, whose rows are spaced like the nodes of
+/// densities.
+fn from_elevation(values: &[[f32; 3]], k: usize) -> Vec<[f64; 3]> {
+    let wo = outgoing(view_cosine(k, ALBEDO_VIEWS));
+    let square = HalfVectorSquare::new(wo);
+    let [rows, columns] = QUADRATURE;
+    let mut sums = vec![[0.0; 3]; ALBEDO_VIEWS];
+    for j in 0..rows {
+        // y = t^4, so dy = 4 t^3 dt.
+        let t = (j as f32 + 0.5) / rows as f32;
+        let (row, width) = (t * t * (t * t), 4.0 * t * t * t / rows as f32);
+        for i in 0..columns {
+            let column = (i as f32 + 0.5) / columns as f32;
+            for side in [-1.0, 1.0] {
+                let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side)
+                else {
+                    continue;
+                };
+                // Half of the square belongs to either side.
+                let weight = f64::from(0.5 * width * cosine / (columns as f32 * per_steradian));
+                let (m, t) = view_between(cosine, ALBEDO_VIEWS);
+                for (m, share) in [(m, 1.0 - f64::from(t)), (m + 1, f64::from(t))] {
+                    (0..3).for_each(|c| sums[m][c] += share * weight * f64::from(f[c]));
+                }
+            }
+        }
+    }
+    sums
+}
+
+/// `f`, `cos theta_i` and what turns densities on the square into densities over solid angle, at a point of the square.
+#[inline(always)]
+fn reflected(
+    values: &[[f32; 3]],
+    square: &HalfVectorSquare,
+    wo: [f32; 3],
+    row: f32,
+    column: f32,
+    side: f32,
+) -> Option<([f32; 3], f32, f32)> {
+    let (wi, per_steradian) = square.direction(row, column, side);
+    if !(wi[2] > 0.0) {
+        return None;
+    }
+    let [[h], [d], [p]] = positions(&wi.map(|x| [x]), &wo.map(|x| [x]));
+    Some((interpolate(values, h, d, p), wi[2], per_steradian))
+}
+
+/// The outgoing direction with this cosine, above the x axis.
+fn outgoing(cosine: f32) -> [f32; 3] {
+    [(1.0 - cosine * cosine).max(0.0).sqrt(), 0.0, cosine]
+}
+
+/// The densities from which directions are drawn: at each node the mean of `luminance(f) cos theta_i` per unit of the
+/// square over the cells about it, weighted by the node's bilinear function, from both sides of the plane of incidence.
+pub(crate) fn densities(values: &[[f32; 3]], reflected_light: &Reflected) -> DirectionDensities {
+    let squares: Vec<Vec<f32>> =
+        (0..VIEWS).into_par_iter().map(|k| square_at(values, reflected_light, k)).collect();
+    DirectionDensities::new(squares.concat())
+}
+
+/// The values of one square of [`densities`], up to a factor.
+fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<f32> {
+    let wo = outgoing(view_cosine(k, VIEWS));
+    let square = HalfVectorSquare::new(wo);
+    let luminance = |f: [f32; 3]| -> f64 { (0..3).map(|c| LUMINANCE_WEIGHTS[c] * f64::from(f[c])).sum() };
+    let (mut sums, mut weights) = (vec![0.0; ROWS * COLUMNS], vec![0.0; ROWS * COLUMNS]);
+    let within = |point: usize| (point as f32 + 0.5) / CELL_POINTS as f32;
+    for point in 0..(ROWS - 1) * CELL_POINTS * (COLUMNS - 1) * CELL_POINTS {
+        let (along, across) = (point / ((COLUMNS - 1) * CELL_POINTS), point % ((COLUMNS - 1) * CELL_POINTS));
+        let (j, x) = (along / CELL_POINTS, within(along % CELL_POINTS));
+        let (i, b) = (across / CELL_POINTS, within(across % CELL_POINTS));
+        let row = row_node(j) + (row_node(j + 1) - row_node(j)) * x;
+        let column = column_node(i) + (column_node(i + 1) - column_node(i)) * b;
+        let mut value = 0.0;
+        for side in [-1.0, 1.0] {
+            if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {
+                let f = reflected_light.conserve(f, cosine, wo[2]);
+                value += luminance(f) * f64::from(cosine / per_steradian);
+            }
+        }
+        for (node, weight) in [
+            (j * COLUMNS + i, (1.0 - x) * (1.0 - b)),
+            (j * COLUMNS + i + 1, (1.0 - x) * b),
+            ((j + 1) * COLUMNS + i, x * (1.0 - b)),
+            ((j + 1) * COLUMNS + i + 1, x * b),
+        ] {
+            sums[node] += f64::from(weight) * value;
+            weights[node] += f64::from(weight);
+        }
+    }
+    sums.iter().zip(&weights).map(|(sum, weight)| narrow(sum / weight)).collect()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of a material")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
