@@ -7,6 +7,22 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+__all__ = [
+    "Baked",
+    "Material",
+    "Model",
+    "Plan",
+    "Prediction",
+    "Samples",
+    "Source",
+    "__version__",
+    "built_in_materials",
+    "direction",
+    "fit",
+    "half_difference",
+    "plan",
+]
+
 __version__: str
 
 _Path = str | PathLike[str]
