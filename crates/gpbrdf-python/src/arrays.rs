@@ -60,12 +60,15 @@ pub(crate) fn column<'a, T: Element + Copy>(what: &str, array: &'a Like<'_, T>) 
     Ok(numbers(array))
 }
 
+/// Two lists of the same length.
+type Pair<'a, A, B> = (Cow<'a, [A]>, Cow<'a, [B]>);
+
 /// Two lists of the same length: a list of one row stands for as many as the other has.
 pub(crate) fn paired<'a, A: Copy, B: Copy>(
     names: &str,
     a: Cow<'a, [A]>,
     b: Cow<'a, [B]>,
-) -> PyResult<(Cow<'a, [A]>, Cow<'a, [B]>)> {
+) -> PyResult<Pair<'a, A, B>> {
     match (a.len(), b.len()) {
         (n, m) if n == m => Ok((a, b)),
         (1, m) => Ok((vec![a[0]; m].into(), b)),

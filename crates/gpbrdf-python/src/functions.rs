@@ -69,7 +69,6 @@ pub(crate) fn half_difference<'py>(
 #[pyo3(text_signature = "(samples, *, solver='auto', kernel='matern52', transform='log', epsilon=0.001, \
 mean='constant', noise=None, hyper_priors=True, prior='built-in', outliers='downweight', per_channel=False, \
 restarts=0, seed=0, progress=None)")]
-#[expect(clippy::needless_pass_by_value, reason = "arguments of Python are owned")]
 pub(crate) fn fit(
     py: Python<'_>,
     samples: PyRef<'_, Samples>,
@@ -121,7 +120,6 @@ pub(crate) fn fit(
     text_signature = "(measured=None, *, count=None, until=None, prior='built-in', step=5.0, incidences=None, \
 theta_max=80.0, in_plane=False, min_separation=3.0, environment=None)"
 )]
-#[expect(clippy::needless_pass_by_value, reason = "arguments of Python are owned")]
 pub(crate) fn plan(
     py: Python<'_>,
     measured: Option<PyRef<'_, Samples>>,

@@ -3,7 +3,12 @@
 //! Classes hold what the core holds; functions take and return arrays. Directions are unit vectors in the local frame,
 //! whose normal is `+z`, as rows of an array of shape `(n, 3)`. The interpreter's lock is released during work. What
 //! users read is in the doc comments of the Python items and in `gpbrdf.pyi`.
-#![allow(clippy::missing_errors_doc, reason = "doc comments of Python items are written for Python")]
+#![allow(
+    clippy::doc_markdown,
+    clippy::missing_errors_doc,
+    reason = "doc comments of Python items are plain text"
+)]
+#![allow(clippy::needless_pass_by_value, reason = "arguments of Python items are owned")]
 
 mod arrays;
 mod baked;

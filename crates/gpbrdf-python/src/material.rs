@@ -24,7 +24,7 @@ impl Material {
     #[new]
     #[pyo3(signature = (table, *, energy_conserving=false))]
     fn new(py: Python<'_>, table: Like<'_, f32>, energy_conserving: bool) -> PyResult<Self> {
-        let options = MaterialOptions { energy_conserving, ..MaterialOptions::default() };
+        let options = MaterialOptions { energy_conserving };
         let table = BrdfTable::from_values(table_cells("table", &table)?).map_err(exception)?;
         Ok(Self { inner: released(py, || gpbrdf_core::Material::new(table, &options))? })
     }

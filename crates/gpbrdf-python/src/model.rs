@@ -83,7 +83,6 @@ impl Model {
     /// The model in all cells of a table: mean and standard deviation. progress is called with the share that is done
     /// of each of them.
     #[pyo3(signature = (*, progress=None))]
-    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python are owned")]
     fn bake(&self, py: Python<'_>, progress: Option<Py<PyAny>>) -> PyResult<Baked> {
         let (mean, sigma) = observed(py, progress.as_ref(), |observer| {
             Ok((bake_mean_observed(&self.inner, observer)?, bake_sigma_observed(&self.inner, observer)?))
@@ -98,7 +97,7 @@ impl Model {
     /// The model as a material that a renderer evaluates and samples.
     #[pyo3(signature = (*, energy_conserving=false))]
     fn material(&self, py: Python<'_>, energy_conserving: bool) -> PyResult<Material> {
-        let options = MaterialOptions { energy_conserving, ..MaterialOptions::default() };
+        let options = MaterialOptions { energy_conserving };
         let inner = observed(py, None, |_| gpbrdf_core::Material::new(bake_mean(&self.inner), &options))?;
         Ok(Material { inner })
     }

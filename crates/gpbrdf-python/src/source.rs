@@ -224,7 +224,7 @@ impl Source {
     /// The source as a material that a renderer evaluates and samples.
     #[pyo3(signature = (*, energy_conserving=false))]
     fn material(&self, py: Python<'_>, energy_conserving: bool) -> PyResult<Material> {
-        let options = MaterialOptions { energy_conserving, ..MaterialOptions::default() };
+        let options = MaterialOptions { energy_conserving };
         Ok(Material { inner: released(py, || self.inner.material(&options))? })
     }
 
