@@ -38,13 +38,13 @@ pub(crate) fn write(
     released(py, || source.write(&path, OutputFormat::of(&path)?, &options))
 }
 
-/// A source that comes from no file.
+/// A source that comes from no file. Its name stands for the file in messages.
 pub(crate) fn source_of(name: String, kind: &str, content: Content) -> gpbrdf_core::Source {
     gpbrdf_core::Source {
         description: name.clone(),
+        path: Some(PathBuf::from(&name)),
         name,
         kind: kind.to_owned(),
-        path: None,
         sha256: String::new(),
         content,
     }

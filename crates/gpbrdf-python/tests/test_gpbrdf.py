@@ -156,7 +156,8 @@ def test_plans_keep_the_limits_of_the_instrument():
 
 
 @pytest.mark.parametrize(
-    ("layout", "count"), [("lattice", 240), ("random", 50), ("cells", 50), ("hemisphere", 50), ("in-plane", 50), ("gonio", 90)]
+    ("layout", "count"),
+    [("lattice", 240), ("random", 50), ("cells", 50), ("hemisphere", 50), ("in-plane", 50), ("gonio", 90)],
 )
 def test_layouts_measure_the_source(layout, count):
     source = gpbrdf.Source.built_in("ward")
@@ -185,6 +186,9 @@ def test_errors_say_what_was_expected(tmp_path):
         gpbrdf.fit(source.measure(count=100), solver="exact")
     with pytest.raises(ValueError, match="found .png"):
         source.write(tmp_path / "t.png")
+    with pytest.raises(ValueError, match="^lobe: expected a BRDF"):
+        samples = gpbrdf.Samples.from_directions([0, 0, 1], [0, 0, 1], [1.0], name="lobe")
+        samples.write(tmp_path / "t.exr")
     with pytest.raises(OSError):
         source.write(tmp_path / "absent" / "t.binary")
     assert not list(pathlib.Path(tmp_path).iterdir())
