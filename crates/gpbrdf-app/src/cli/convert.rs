@@ -1,15 +1,10 @@
 //! `gpbrdf-cli convert`: writes any source as `.binary`, `.exr`, `.bsdf`, `.csv`, Zemax `.bsdf` or a texture.
 
-use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use gpbrdf_core::formats::{
-    ExrChannels, ExrPart, RglBrdf, RglColours, RglGrid, SpecularGrid, SpecularTable, TextureFormat,
-    write_merl, write_rgl, write_samples_csv, write_table_exr, write_texture, write_zemax,
-};
-use gpbrdf_core::{Baked, Content, LatticeLayout, Layout, SampleSet, Source, Symmetry, detect_symmetry};
+use gpbrdf_core::formats::{OutputFormat, OutputOptions, RglColours, TextureFormat};
 
 use super::input::open;
 use super::reading::Reading;
@@ -32,7 +27,7 @@ pub(crate) struct Convert {
     #[arg(long)]
     rgb: bool,
     /// Number of samples of a .csv from a source that can be evaluated at any direction.
-    #[arg(long, value_name = "N", default_value_t = 3072)]
+    #[arg(long, value_name = "N", default_value_t = OutputOptions::default().samples)]
     samples: usize,
 }
 
@@ -60,109 +55,33 @@ enum Written {
     Zemax,
 }
 
-impl Written {
-    /// The format that the name of a file says.
-    fn of(path: &Path) -> Result<Self> {
-        if let Some(format) = TextureFormat::of(path) {
-            return Ok(match format {
-                TextureFormat::Dds => Self::Dds,
-                TextureFormat::Ktx2 => Self::Ktx2,
-                TextureFormat::Npy => Self::Npy,
-                TextureFormat::Raw => Self::Raw,
-            });
+impl From<Written> for OutputFormat {
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Merl => Self::Merl,
+            Written::Exr => Self::Exr,
+            Written::Rgl => Self::Rgl,
+            Written::Csv => Self::Csv,
+            Written::Dds => Self::Texture(TextureFormat::Dds),
+            Written::Ktx2 => Self::Texture(TextureFormat::Ktx2),
+            Written::Npy => Self::Texture(TextureFormat::Npy),
+            Written::Raw => Self::Texture(TextureFormat::Raw),
+            Written::Zemax => Self::Zemax,
         }
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
-        Ok(match extension.as_str() {
-            "binary" => Self::Merl,
-            "exr" => Self::Exr,
-            "bsdf" => Self::Rgl,
-            "csv" => Self::Csv,
-            _ => bail!(
-                "\"{}\": expected a name that ends in .binary, .exr, .bsdf, .csv, .dds, .ktx2, .npy or .bin",
-                path.display()
-            ),
-        })
     }
 }
 
 impl Convert {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let format = self.format.map_or_else(|| Written::of(&self.output), Ok)?;
-        if self.rgb && !matches!(format, Written::Rgl) {
+        let format =
+            self.format.map_or_else(|| OutputFormat::of(&self.output), |format| Ok(format.into()))?;
+        if self.rgb && format != OutputFormat::Rgl {
             bail!("--rgb: expected an RGL file as output, found \"{}\"", self.output.display());
         }
         let source = open(&self.input, self.reading, terminal)?;
-        match format {
-            Written::Merl => {
-                let table = terminal.stage("Tabulating", || source.table())?;
-                write_merl(&self.output, &table)?;
-            }
-            Written::Exr => {
-                let table = terminal.stage("Tabulating", || source.table())?;
-                let part = ExrPart {
-                    name: "mean",
-                    description: &source.name,
-                    unit: "sr^-1",
-                    channels: ExrChannels::Rgb(table.values()),
-                };
-                write_table_exr(&self.output, &[part])?;
-            }
-            Written::Rgl => {
-                let brdf = source.brdf()?;
-                let table = terminal.stage("Tabulating", || {
-                    RglBrdf::tabulate(brdf, RglGrid::default(), description(&source))
-                })?;
-                let colours = if self.rgb { RglColours::Rgb } else { RglColours::Spectral };
-                write_rgl(&self.output, &table, colours)?;
-            }
-            Written::Csv => write_samples_csv(&self.output, &*self.measure(&source, terminal)?)?,
-            Written::Dds => self.write_texture(&source, TextureFormat::Dds, terminal)?,
-            Written::Ktx2 => self.write_texture(&source, TextureFormat::Ktx2, terminal)?,
-            Written::Npy => self.write_texture(&source, TextureFormat::Npy, terminal)?,
-            Written::Raw => self.write_texture(&source, TextureFormat::Raw, terminal)?,
-            Written::Zemax => {
-                let table = terminal.stage("Sampling", || specular_table(&source))?;
-                write_zemax(&self.output, &table)?;
-            }
-        }
+        let colours = if self.rgb { RglColours::Rgb } else { RglColours::Spectral };
+        let options = OutputOptions { colours, samples: self.samples };
+        terminal.stage("Converting", || source.write(&self.output, format, &options))?;
         terminal.summary(&format!("wrote {}", self.output.display()))
-    }
-
-    /// A texture of the source. Alpha is the standard deviation of a model, else 0.
-    fn write_texture(&self, source: &Source, format: TextureFormat, terminal: &Terminal) -> Result<()> {
-        if let Content::Model(model) = &source.content {
-            let baked = terminal.stage("Baking", || Baked::new(model))?;
-            return Ok(write_texture(&self.output, format, &baked.mean, Some(&baked.sigma))?);
-        }
-        let table = terminal.stage("Tabulating", || source.table())?;
-        Ok(write_texture(&self.output, format, &table, None)?)
-    }
-
-    /// The samples of the source, or samples of it on a lattice.
-    fn measure<'a>(&self, source: &'a Source, terminal: &Terminal) -> Result<Cow<'a, SampleSet>> {
-        if let Content::Samples(samples) = &source.content {
-            return Ok(Cow::Borrowed(samples));
-        }
-        let symmetry = detect_symmetry(source.brdf()?);
-        let layout = Layout::Lattice(LatticeLayout::with_samples(self.samples, symmetry)?);
-        Ok(Cow::Owned(terminal.stage("Sampling", || source.measure(&layout))?))
-    }
-}
-
-/// The source about the specular direction: its samples if it has any, else its values on a fine grid.
-fn specular_table(source: &Source) -> Result<SpecularTable> {
-    if let Content::Samples(samples) = &source.content {
-        return Ok(SpecularTable::from_samples(samples)?);
-    }
-    let brdf = source.brdf()?;
-    let grid = SpecularGrid::fine(detect_symmetry(brdf) == Symmetry::Bilateral);
-    Ok(SpecularTable::measure(brdf, grid, description(source)))
-}
-
-/// What a file says about its material.
-fn description(source: &Source) -> String {
-    match &source.content {
-        Content::Model(_) | Content::Table(_) => source.name.clone(),
-        _ => source.description.clone(),
     }
 }

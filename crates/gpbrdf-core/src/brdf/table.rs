@@ -164,6 +164,12 @@ impl BrdfTable {
         &self.values
     }
 
+    /// The values in MERL order, sr^-1, for code that keeps them.
+    #[must_use]
+    pub fn into_values(self) -> Vec<[f32; 3]> {
+        self.values
+    }
+
     /// The value of one cell, sr^-1.
     #[must_use]
     pub fn cell(&self, i_theta_h: usize, i_theta_d: usize, i_phi_d: usize) -> [f32; 3] {

@@ -12,6 +12,7 @@ mod model;
 #[cfg(test)]
 pub(crate) mod mutate;
 mod neural;
+mod output;
 pub(crate) mod read;
 mod rgl;
 pub(crate) mod source;
@@ -32,6 +33,7 @@ pub use measured::zemax::{SpecularGrid, SpecularTable, write_zemax, write_zemax_
 pub use measured::{AngleUnit, ReadOptions, ValueKind, Zenith};
 pub use merl::{MERL_BYTES, merl_material_name, read_merl, write_merl, write_merl_to};
 pub use neural::{is_neural_csv, read_neural_csv};
+pub use output::{OutputFormat, OutputOptions};
 pub use rgl::{RglBrdf, RglColours, RglGrid, read_rgl, write_rgl, write_rgl_to};
 pub use source::{Content, Source};
 pub use texture::{TextureFormat, texture_files, write_texture};

@@ -1,0 +1,206 @@
+"""A complete, render-ready material from few reflectance measurements, with an honest error bar."""
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "Baked",
+    "Material",
+    "Model",
+    "Plan",
+    "Prediction",
+    "Samples",
+    "Source",
+    "__version__",
+    "built_in_materials",
+    "direction",
+    "fit",
+    "half_difference",
+    "plan",
+]
+
+__version__: str
+
+_Path = str | PathLike[str]
+
+@final
+class Source:
+    def __new__(
+        cls,
+        path: _Path,
+        *,
+        values: Literal["brdf", "cosine", "factor"] | None = None,
+        angles: Literal["degrees", "radians"] | None = None,
+        zenith: Literal["theta", "phi"] | None = None,
+    ) -> Source: ...
+    @staticmethod
+    def built_in(name: str) -> Source: ...
+    @staticmethod
+    def from_table(table: ArrayLike, *, name: str = "table") -> Source: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def description(self) -> str: ...
+    @property
+    def sha256(self) -> str: ...
+    @property
+    def notices(self) -> list[str]: ...
+    @property
+    def is_scattered(self) -> bool: ...
+    def samples(self) -> Samples: ...
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]: ...
+    def measure(
+        self,
+        layout: Literal["lattice", "random", "cells", "hemisphere", "in-plane", "gonio"] = "lattice",
+        *,
+        count: int | None = None,
+        shape: Sequence[int] | None = None,
+        incidences: Sequence[float] | None = None,
+        symmetry: Literal["auto", "bilateral", "reciprocal"] = "auto",
+        seed: int = 0,
+    ) -> Samples: ...
+    def table(self) -> NDArray[np.float32]: ...
+    def material(self, *, energy_conserving: bool = False) -> Material: ...
+    def write(self, path: _Path, *, samples: int = 3072, rgb: bool = False) -> None: ...
+
+@final
+class Samples:
+    @staticmethod
+    def from_directions(
+        wi: ArrayLike, wo: ArrayLike, values: ArrayLike, *, sigma: ArrayLike | None = None, name: str = "samples"
+    ) -> Samples: ...
+    @staticmethod
+    def from_half_difference(
+        angles: ArrayLike, values: ArrayLike, *, sigma: ArrayLike | None = None, name: str = "samples"
+    ) -> Samples: ...
+    @property
+    def wi(self) -> NDArray[np.float64]: ...
+    @property
+    def wo(self) -> NDArray[np.float64]: ...
+    @property
+    def half_difference(self) -> NDArray[np.float64]: ...
+    @property
+    def values(self) -> NDArray[np.float64]: ...
+    @property
+    def sigma(self) -> NDArray[np.float64] | None: ...
+    @property
+    def notices(self) -> list[str]: ...
+    def subset(self, indices: Sequence[int]) -> Samples: ...
+    def write(self, path: _Path) -> None: ...
+    def __len__(self) -> int: ...
+
+@final
+class Prediction:
+    @property
+    def mean(self) -> NDArray[np.float64]: ...
+    @property
+    def lower(self) -> NDArray[np.float64]: ...
+    @property
+    def upper(self) -> NDArray[np.float64]: ...
+
+@final
+class Baked:
+    @property
+    def mean(self) -> NDArray[np.float32]: ...
+    @property
+    def sigma(self) -> NDArray[np.float32]: ...
+    @property
+    def noise_variances(self) -> list[float]: ...
+
+@final
+class Model:
+    @staticmethod
+    def load(path: _Path) -> Model: ...
+    def save(self, path: _Path) -> None: ...
+    def predict(
+        self,
+        wi: ArrayLike | None = None,
+        wo: ArrayLike | None = None,
+        *,
+        half_difference: ArrayLike | None = None,
+        of: Literal["observation", "latent"] = "observation",
+    ) -> Prediction: ...
+    def bake(self, *, progress: Callable[[float], object] | None = None) -> Baked: ...
+    def material(self, *, energy_conserving: bool = False) -> Material: ...
+    def write(self, path: _Path, *, samples: int = 3072, rgb: bool = False) -> None: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def solver(self) -> str: ...
+    @property
+    def n_samples(self) -> int: ...
+    @property
+    def noise_variances(self) -> tuple[float, float, float]: ...
+    @property
+    def log_marginal_likelihood(self) -> float | None: ...
+    @property
+    def converged(self) -> bool | None: ...
+    @property
+    def hyper_parameters(self) -> str: ...
+
+@final
+class Material:
+    def __new__(cls, table: ArrayLike, *, energy_conserving: bool = False) -> Material: ...
+    def eval(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float32]: ...
+    def pdf(self, wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float32]: ...
+    def sample(
+        self, wo: ArrayLike, u: ArrayLike
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]: ...
+    def albedo(self, wo: ArrayLike) -> NDArray[np.float32]: ...
+
+@final
+class Plan:
+    @property
+    def theta_i(self) -> NDArray[np.float64]: ...
+    @property
+    def theta_o(self) -> NDArray[np.float64]: ...
+    @property
+    def phi_o(self) -> NDArray[np.float64]: ...
+    @property
+    def wi(self) -> NDArray[np.float64]: ...
+    @property
+    def wo(self) -> NDArray[np.float64]: ...
+    @property
+    def errors(self) -> NDArray[np.float64]: ...
+    @property
+    def tour(self) -> NDArray[np.uintp]: ...
+
+def built_in_materials() -> list[str]: ...
+def direction(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]: ...
+def half_difference(wi: ArrayLike, wo: ArrayLike) -> NDArray[np.float64]: ...
+def fit(
+    samples: Samples,
+    *,
+    solver: Literal["auto", "lattice", "scattered", "dense"] = "auto",
+    kernel: str = "matern52",
+    transform: Literal["log", "identity", "cube-root"] = "log",
+    epsilon: float = 0.001,
+    mean: Literal["constant", "zero"] = "constant",
+    noise: float | None = None,
+    hyper_priors: bool = True,
+    prior: _Path | None = "built-in",
+    outliers: Literal["keep", "downweight"] = "downweight",
+    per_channel: bool = False,
+    restarts: int = 0,
+    seed: int = 0,
+    progress: Callable[[float], object] | None = None,
+) -> Model: ...
+def plan(
+    measured: Samples | None = None,
+    *,
+    count: int | None = None,
+    until: float | None = None,
+    prior: _Path | None = "built-in",
+    step: float = 5.0,
+    incidences: Sequence[float] | None = None,
+    theta_max: float = 80.0,
+    in_plane: bool = False,
+    min_separation: float = 3.0,
+    environment: _Path | None = None,
+) -> Plan: ...
