@@ -1,6 +1,7 @@
 //! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
 mod bake;
+mod batch;
 mod convert;
 mod eval;
 mod fit;
@@ -8,6 +9,7 @@ mod info;
 mod input;
 mod learn;
 mod library;
+mod making;
 mod materials;
 mod parse;
 mod plan;
@@ -48,7 +50,9 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Sample, fit, bake and compare: the main job.
-    Bake(bake::Bake),
+    Bake(Box<bake::Bake>),
+    /// The same for many materials, a folder for each; goes on where it was stopped.
+    Batch(Box<batch::Batch>),
     /// Sample and fit; write the model only.
     Fit(fit::Fit),
     /// What an instrument would measure: scattered samples with noise and outliers, as a CSV file.
@@ -96,6 +100,7 @@ pub fn main() -> ExitCode {
     }
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
+        Command::Batch(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
         Command::Sample(command) => command.run(&terminal),
         Command::Plan(command) => command.run(&terminal),
