@@ -50,7 +50,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Sample, fit, bake and compare: the main job.
-    Bake(Box<bake::Bake>),
+    Bake(bake::Bake),
     /// The same for many materials, a folder for each; goes on where it was stopped.
     Batch(Box<batch::Batch>),
     /// Sample and fit; write the model only.
