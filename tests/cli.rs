@@ -5,6 +5,7 @@ mod harness;
 
 mod cli {
     mod bake;
+    mod batch;
     mod broken_files;
     mod check;
     mod commands;

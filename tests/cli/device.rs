@@ -79,7 +79,7 @@ fn the_lookup_comes_in_every_language() {
     let cli = Cli::new();
     for (language, mark) in [
         ("wgsl", "fn gpbrdf_lookup("),
-        ("glsl", "#version 450"),
+        ("glsl", "#ifndef GPBRDF_LOOKUP_INCLUDED"),
         ("hlsl", "Texture3D<float4>"),
         ("msl", "metal::texture3d<float"),
     ] {
@@ -88,6 +88,8 @@ fn the_lookup_comes_in_every_language() {
         cli.ok(&["-q", "shader", "--lang", language, "-o", "lookup.txt"]);
         assert_eq!(cli.read("lookup.txt"), text.as_bytes());
     }
+    let whole = cli.ok(&["shader", "--lang", "glsl", "--compute"]);
+    assert!(whole.starts_with("#version 450") && whole.contains("void main()"), "{whole}");
     cli.ok(&["shader", "--lang", "spirv", "-o", "lookup.spv"]);
     assert_eq!(cli.read("lookup.spv")[..4], 0x0723_0203u32.to_le_bytes());
 }

@@ -71,7 +71,7 @@ pub use {glam, wgpu};
 pub use bake::{Baker, Progress};
 pub use context::{AdapterChoice, Context};
 pub use error::{Error, Result};
-pub use lookup::{ShaderLanguage, evaluate, translate};
+pub use lookup::{ShaderLanguage, evaluate, include, translate};
 pub use material::density_buffer;
 pub use scene::camera::{Camera, Projection};
 pub use scene::display::{Background, Display, Encoding, Show, ToneCurve};

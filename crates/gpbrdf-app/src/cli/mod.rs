@@ -1,6 +1,7 @@
 //! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
 mod bake;
+mod batch;
 mod check;
 mod convert;
 mod eval;
@@ -9,6 +10,7 @@ mod info;
 mod input;
 mod learn;
 mod library;
+mod making;
 mod materials;
 mod parse;
 mod plan;
@@ -50,6 +52,8 @@ struct Arguments {
 enum Command {
     /// Sample, fit, bake and compare: the main job.
     Bake(bake::Bake),
+    /// The same for many materials, a folder for each; goes on where it was stopped.
+    Batch(Box<batch::Batch>),
     /// Sample and fit; write the model only.
     Fit(fit::Fit),
     /// What an instrument would measure: scattered samples with noise and outliers, as a CSV file.
@@ -99,6 +103,7 @@ pub fn main() -> ExitCode {
     }
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),
+        Command::Batch(command) => command.run(&terminal),
         Command::Fit(command) => command.run(&terminal),
         Command::Sample(command) => command.run(&terminal),
         Command::Plan(command) => command.run(&terminal),

@@ -2,9 +2,10 @@
 
 use clap::{Args, ValueEnum};
 use gpbrdf_core::formats::{AngleUnit, ReadOptions, ValueKind, Zenith};
+use serde::Serialize;
 
 /// How to read measurements that are text.
-#[derive(Args, Clone, Copy, Debug, Default)]
+#[derive(Args, Clone, Copy, Debug, Default, Serialize)]
 pub(crate) struct Reading {
     /// What the values of measured samples are [default: what their file says, else brdf]
     #[arg(long, value_enum, value_name = "KIND", help_heading = "Measured samples")]
@@ -17,7 +18,8 @@ pub(crate) struct Reading {
     zenith: Option<ZenithName>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 enum Values {
     /// The BRDF f, in 1/sr.
     Brdf,
@@ -27,7 +29,8 @@ enum Values {
     Factor,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 enum Angles {
     /// 360 for a full turn.
     Degrees,
@@ -35,7 +38,8 @@ enum Angles {
     Radians,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 enum ZenithName {
     /// theta is measured from the normal and phi about it.
     Theta,

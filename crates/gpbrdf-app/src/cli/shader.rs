@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_render::{ShaderLanguage, translate};
+use gpbrdf_render::{ShaderLanguage, include, translate};
 
 use super::terminal::Terminal;
 
@@ -15,6 +15,10 @@ pub(crate) struct Shader {
     /// Shading language.
     #[arg(long, value_enum, default_value = "wgsl")]
     lang: Language,
+    /// Write a whole compute shader, which evaluates pairs of directions in a buffer, instead of functions to
+    /// include. SPIR-V is always one.
+    #[arg(long)]
+    compute: bool,
     /// File to write; standard output by default.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -44,7 +48,8 @@ impl Shader {
             Language::Spirv => ShaderLanguage::Spirv,
         };
         let binary = language == ShaderLanguage::Spirv;
-        let code = translate(language)?;
+        let code =
+            if self.compute || binary { translate(language)? } else { include(language)?.into_bytes() };
         let Some(path) = &self.output else {
             if binary && terminal.is_terminal() {
                 bail!("SPIR-V is binary: expected --output FILE, found a terminal");

@@ -9,6 +9,7 @@ use gpbrdf_core::gp::DeviceForm;
 use gpbrdf_core::model::bake_mean_observed;
 use gpbrdf_core::{BrdfTable, Model, Progress, SigmaTable};
 use gpbrdf_render::{AdapterChoice, Baker, Context, Error, Precision};
+use serde::Serialize;
 
 use super::run::{Baked, Observer, Run};
 use super::stage::Stage;
@@ -17,7 +18,8 @@ use super::stage::Stage;
 pub(super) const CPU: &str = "cpu";
 
 /// Where to bake.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub(crate) enum Backend {
     /// A GPU for dense models, if there is one; a lattice model is baked on the CPU before a device is open.
     #[default]

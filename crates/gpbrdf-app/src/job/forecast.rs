@@ -3,8 +3,11 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use gpbrdf_core::Solver;
 use gpbrdf_core::gp::{dense_cost, scattered_cost};
+use gpbrdf_core::{Content, Solver, Source};
+
+use super::choices::LayoutChoice;
+use super::spec::{ModelSpec, PAPER_SAMPLES};
 
 /// Evaluations of likelihood and gradient that a dense search usually takes.
 const DENSE_EVALUATIONS: usize = 40;
@@ -37,6 +40,25 @@ pub(crate) fn forecast(samples: usize, solver: Solver, per_channel: bool) -> Res
     let seconds = searches * cost.seconds;
     Ok((seconds > LONG)
         .then(|| format!("a dense fit to {samples} samples takes {gib:.1} GiB and about {seconds:.0} s")))
+}
+
+/// Memory of a job besides that of its solver, in bytes: its tables, those of the source and what is written of them.
+const TABLES: f64 = 400e6;
+
+/// Memory that a job takes, in bytes, with all its files.
+pub(crate) fn memory_bytes(source: &Source, spec: &ModelSpec) -> f64 {
+    let samples = match &source.content {
+        Content::Samples(samples) => samples.len(),
+        _ if spec.layout != LayoutChoice::Lattice => spec.scattered_samples(),
+        _ => spec.lattice.map_or(spec.samples.unwrap_or(PAPER_SAMPLES), |shape| shape.iter().product()),
+    };
+    let is_scattered = matches!(source.content, Content::Samples(_)) || spec.layout != LayoutChoice::Lattice;
+    let solver = match spec.solver {
+        Solver::Dense => dense_cost(samples, 3, DENSE_EVALUATIONS).bytes,
+        _ if is_scattered => scattered_cost(samples).bytes,
+        _ => 0.0,
+    };
+    TABLES + solver
 }
 
 /// What is said of the time that is left of work of which a share was done in `elapsed`: nothing in its first second

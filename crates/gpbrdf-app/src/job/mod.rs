@@ -31,7 +31,7 @@ mod stage;
 
 pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
-pub(crate) use forecast::{remaining, samples_within};
+pub(crate) use forecast::{memory_bytes, remaining, samples_within};
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;

@@ -15,6 +15,12 @@ static PENDING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 /// Number of the next temporary file; it keeps the names of this process apart.
 static COUNTER: AtomicU64 = AtomicU64::new(0);
 
+/// How the name of a temporary file begins.
+const PREFIX: &str = ".gpbrdf-";
+
+/// How the name of a temporary file ends.
+const SUFFIX: &str = ".tmp";
+
 /// Size of a file's buffer: large enough that a table's many small writes cost few system calls.
 const BUFFER_BYTES: usize = 1 << 18;
 
@@ -57,7 +63,7 @@ impl AtomicFile {
         let mut pending = pending();
         loop {
             let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-            let temporary = folder.join(format!(".gpbrdf-{}-{number}.tmp", std::process::id()));
+            let temporary = folder.join(format!("{PREFIX}{}-{number}{SUFFIX}", std::process::id()));
             match OpenOptions::new().write(true).create_new(true).open(&temporary) {
                 Ok(file) => {
                     pending.insert(temporary.clone());
@@ -85,6 +91,29 @@ impl AtomicFile {
         let mut file = Self::create(path.as_ref())?;
         file.write_all(bytes).map_err(|source| Error::write(path.as_ref(), source))?;
         file.commit()
+    }
+
+    /// Removes the temporary files that killed processes have left in a folder. No other process may be writing to it;
+    /// the files of this one are kept. A folder that does not exist holds none.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the folder cannot be listed or a file cannot be removed.
+    pub fn remove_abandoned(folder: impl AsRef<Path>) -> Result<()> {
+        let folder = folder.as_ref();
+        let entries = match fs::read_dir(folder) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(Error::read(folder, error)),
+        };
+        let pending = pending();
+        for entry in entries {
+            let path = entry.map_err(|source| Error::read(folder, source))?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            if name.starts_with(PREFIX) && name.ends_with(SUFFIX) && !pending.contains(&path) {
+                fs::remove_file(&path).map_err(|source| Error::write(&path, source))?;
+            }
+        }
+        Ok(())
     }
 
     /// Flushes the file and gives it its name.
@@ -257,8 +286,13 @@ mod tests {
         assert!(AtomicFile::commit_all(both).is_err());
         assert_eq!(names(folder.path()), ["a.txt", "b.txt", "c"]);
 
+        let abandoned = folder.path().join(".gpbrdf-1-7.tmp");
+        fs::write(&abandoned, "half").unwrap();
         let mut file = AtomicFile::create(&path).unwrap();
         file.write_all(b"never seen").unwrap();
+        AtomicFile::remove_abandoned(folder.path()).unwrap();
+        assert!(!abandoned.exists() && names(folder.path()).len() == 4);
+        AtomicFile::remove_abandoned(folder.path().join("absent")).unwrap();
         drop(remove_pending());
         assert_eq!(names(folder.path()), ["a.txt", "b.txt", "c"]);
         assert!(file.commit().is_err());

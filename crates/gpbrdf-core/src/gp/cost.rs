@@ -42,8 +42,9 @@ impl FitCost {
 /// Memory that is assumed to be available where the system does not report it: 4 GiB.
 const ASSUMED_BYTES: f64 = 4.0 * 1_073_741_824.0;
 
-/// Memory that is available without swapping, in bytes: `MemAvailable` of Linux, [`ASSUMED_BYTES`] elsewhere.
-pub(super) fn available_bytes() -> f64 {
+/// Memory that is available without swapping, in bytes: `MemAvailable` of Linux, 4 GiB elsewhere.
+#[must_use]
+pub fn available_bytes() -> f64 {
     let parse = |text: String| {
         let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?.trim();
         let kib: f64 = line.strip_suffix("kB")?.trim().parse().ok()?;

@@ -22,7 +22,7 @@ pub(crate) mod lattice;
 pub(crate) mod learned;
 pub(crate) mod scattered;
 
-pub use cost::FitCost;
+pub use cost::{FitCost, available_bytes};
 pub use dense::DenseGp;
 pub use dense::cost::dense_cost;
 pub use hyper::{Hyper, HyperKind, HyperParameter};
