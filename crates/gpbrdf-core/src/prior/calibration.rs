@@ -8,6 +8,7 @@ use crate::brdf::angles::HalfDiff;
 const MIDDLES: [f64; 4] = [5.0, 20.0, 45.0, 75.0];
 
 /// The ends of the bands, in degrees.
+#[cfg(feature = "fit")]
 const ENDS: [f64; 3] = [10.0, 30.0, 60.0];
 
 /// Half the width of a 90 % interval of a normal distribution, in standard deviations.

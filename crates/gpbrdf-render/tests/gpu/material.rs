@@ -85,7 +85,6 @@ fn sampled_directions_are_those_of_the_core(context: &Context) {
             ];
             worst = std::array::from_fn(|k| worst[k].max(errors[k]));
         }
-        println!("{name}: direction, density, weight, value: {worst:?}; {other} others");
         assert!(other <= 3, "{name}: {other}");
         assert!(worst[0] < 1e-3 && worst[1..].iter().all(|error| *error < 2e-2), "{name}: {worst:?}");
     }
