@@ -57,7 +57,11 @@ fn expected_errors_are_those_of_the_conditioned_process() {
             if let Some(hyper) = hyper.chromatic {
                 // The chromatic colours of the model have the same kernel and nearly no functions.
                 let chromatic = Belief { prior: None, scale: 1.0, ..Belief::of_fit(&hyper, prior).unwrap() };
-                let chromatic = expected_error(&chromatic, &samples.angles, &cells).unwrap().powi(2);
+                // Intervals of the model are calibrated as a whole.
+                let factors = belief.calibration(&cells.angles);
+                let weights = cells.weights.iter().zip(factors).map(|(w, factor)| w * factor).collect();
+                let calibrated = Cells { weights, ..cells.clone() };
+                let chromatic = expected_error(&chromatic, &samples.angles, &calibrated).unwrap().powi(2);
                 expected -= 2.0 / 3.0 * chromatic;
             }
             let own = found.errors[count].powi(2);

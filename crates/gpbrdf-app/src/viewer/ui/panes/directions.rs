@@ -21,7 +21,7 @@ use crate::viewer::work::outbox::Outbox;
 use crate::viewer::work::planner::{PlanKey, PlanRequest, Planned, spawn};
 
 /// Width of the list of planned directions.
-const LIST: f32 = 268.0;
+const LIST: f32 = 310.0;
 
 /// From this width on there is room for the list.
 const ROOMY: f32 = 620.0;
@@ -225,7 +225,7 @@ impl Directions {
             .height(ui.available_height())
             .include_x(-98.0)
             .include_x(98.0)
-            .include_y(-98.0)
+            .include_y(-8.0)
             .include_y(98.0)
             .show_axes(false)
             .show_grid(false)
@@ -290,30 +290,34 @@ fn place(theta: f64, phi: f64) -> [f64; 2] {
     [theta * phi.cos(), theta * phi.sin()]
 }
 
-/// Circles of equal angle from the normal.
+/// Half circles of equal angle from the normal: both sides of the plane of incidence are alike.
 fn draw_rings(plot: &mut PlotUi<'_>, colour: Color32) {
     for theta in [30.0, 60.0, 90.0] {
         let circle: Vec<[f64; 2]> =
-            (0..=120).map(|i| place(theta, f64::from(i) * std::f64::consts::TAU / 120.0)).collect();
+            (0..=90).map(|i| place(theta, f64::from(i) * std::f64::consts::PI / 90.0)).collect();
         let line = Line::new("ring", PlotPoints::from(circle)).color(colour).width(1.0);
         plot.line(line.allow_hover(false));
         let text = RichText::new(format!("{theta:.0}°")).color(colour).size(11.0);
         let at = PlotPoint::new(0.0, theta + 1.0);
         plot.text(Text::new("angle", at, text).anchor(Align2::CENTER_BOTTOM).allow_hover(false));
     }
+    let base = Line::new("plane of incidence", PlotPoints::from(vec![[-90.0, 0.0], [90.0, 0.0]]));
+    plot.line(base.color(colour).width(1.0).allow_hover(false));
     let text = RichText::new("light this way").color(colour).size(11.0);
     plot.text(
-        Text::new("light", PlotPoint::new(92.0, 1.0), text).anchor(Align2::RIGHT_BOTTOM).allow_hover(false),
+        Text::new("light", PlotPoint::new(92.0, -1.0), text).anchor(Align2::RIGHT_TOP).allow_hover(false),
     );
 }
 
-/// Where detectors stood, with the light turned to azimuth 0, which no isotropic material notices.
+/// Where detectors stood, with the light turned to azimuth 0 and on one side of the plane of incidence, which no
+/// isotropic and bilateral material notices.
 fn draw_measured(plot: &mut PlotUi<'_>, document: &Document) {
     let Some(fitted) = document.fitted.as_ref().filter(|_| document.is_scattered()) else { return };
     let measured = fitted.samples.angles.iter().take(MOST_DRAWN).map(|angles| {
         let (wi, wo) = angles.to_directions();
         let theta = wo.z.clamp(-1.0, 1.0).acos().to_degrees();
-        place(theta, wo.y.atan2(wo.x) - wi.y.atan2(wi.x))
+        // The angle between both azimuths, 0 to pi.
+        place(theta, (wo.y * wi.x - wo.x * wi.y).abs().atan2(wo.x * wi.x + wo.y * wi.y))
     });
     let points = Points::new("measured", measured.collect::<Vec<_>>()).radius(2.0);
     plot.points(points.color(document.colour).allow_hover(false));

@@ -120,7 +120,7 @@ fn measurements_ui(ui: &mut Ui, document: &mut Document) {
             ui.label(format!("{}: {} numbers.", fitted.model.solver_label(), fitted.model.n_floats()));
         }
     } else if document.is_scattered() {
-        ui.label("Scattered measurements: all are used, solved densely.");
+        ui.label("Scattered measurements: all of them are used.");
     } else {
         layout_ui(ui, &mut document.spec);
     }
