@@ -1,6 +1,8 @@
 //! A BRDF as a 3-D texture.
 
+use gpbrdf_core::base::to_half;
 use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use gpbrdf_core::formats::texels;
 use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
 
@@ -93,25 +95,11 @@ impl BrdfTexture {
         precision: Precision,
     ) -> Result<Self> {
         let out = Self::empty(context, precision)?;
-        let table = table.filled();
-        let texel = |h: usize, d: usize, p: usize| {
-            let cell = cell_index(h, d, p);
-            let [r, g, b] = table.values()[cell];
-            [r, g, b, sigma.map_or(0.0, |sigma| sigma.largest(cell))]
-        };
         let mut bytes = Vec::with_capacity(N_CELLS * precision.texel_bytes() as usize);
-        for p in 0..N_PHI_D {
-            for d in 0..N_THETA_D {
-                for h in 0..N_THETA_H {
-                    for x in texel(h, d, p) {
-                        match precision {
-                            Precision::Half => {
-                                bytes.extend_from_slice(&f16::from_f32(x.min(65_504.0)).to_le_bytes());
-                            }
-                            Precision::Single => bytes.extend_from_slice(&x.to_le_bytes()),
-                        }
-                    }
-                }
+        for x in texels(&table.filled(), sigma).flatten() {
+            match precision {
+                Precision::Half => bytes.extend_from_slice(&to_half(x.into()).to_le_bytes()),
+                Precision::Single => bytes.extend_from_slice(&x.to_le_bytes()),
             }
         }
         context.guard("upload of a BRDF", || {

@@ -3,7 +3,8 @@
 use ::half::f16;
 
 /// The nearest number of half precision; beyond 65,504 in size, the largest finite one.
-pub(crate) fn to_half(x: f64) -> f16 {
+#[must_use]
+pub fn to_half(x: f64) -> f16 {
     f16::from_f64(x.clamp(f16::MIN.to_f64(), f16::MAX.to_f64()))
 }
 

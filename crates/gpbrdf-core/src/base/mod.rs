@@ -18,6 +18,7 @@ pub(crate) mod watch;
 pub use atomic_file::{AtomicFile, PendingRemoved, remove_pending};
 pub use chi_square::{ChiSquare, chi_square};
 pub use error::{Error, Result};
+pub use f16::to_half;
 pub use random::{SplitMix64, golden_ratio_subset, quasi_random};
 pub use raster::Raster;
 pub use watch::{Observer, Progress, Steps, Watch};

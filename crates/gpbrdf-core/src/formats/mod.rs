@@ -36,7 +36,7 @@ pub use neural::{is_neural_csv, read_neural_csv};
 pub use output::{OutputFormat, OutputOptions};
 pub use rgl::{RglBrdf, RglColours, RglGrid, read_rgl, write_rgl, write_rgl_to};
 pub use source::{Content, Source};
-pub use texture::{TextureFormat, texture_files, write_texture};
+pub use texture::{TextureFormat, texels, texture_files, write_texture};
 
 /// The formats that can be read, in the order in which they are tried.
 pub const FORMATS: [&Format; 9] = [

@@ -12,12 +12,11 @@ mod raw;
 use std::io::{self, Write};
 use std::path::Path;
 
-use half::f16;
-
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
+use crate::base::f16::to_half;
 use crate::brdf::SigmaTable;
-use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use crate::brdf::table::{BrdfTable, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
 
 /// Texels along x, y and z.
 const SIZE: [u32; 3] = [90, 90, 180];
@@ -103,30 +102,33 @@ fn written(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -
     Ok(file)
 }
 
-/// Writes the texels, layer by layer.
-fn write_texels(mut to: impl Write, table: &BrdfTable, sigma: Option<&SigmaTable>) -> io::Result<()> {
-    let table = table.filled();
-    let mut layer = Vec::with_capacity(N_CELLS / N_PHI_D * TEXEL_BYTES as usize);
-    for p in 0..N_PHI_D {
-        layer.clear();
-        for d in 0..N_THETA_D {
-            for h in 0..N_THETA_H {
-                let cell = cell_index(h, d, p);
-                let [r, g, b] = table.values()[cell];
-                for x in [r, g, b, sigma.map_or(0.0, |sigma| sigma.largest(cell))] {
-                    layer.extend(f16::from_f32(x.min(f16::MAX.to_f32())).to_le_bytes());
-                }
-            }
-        }
-        to.write_all(&layer)?;
+/// The texels of a texture in its order: red, green and blue of a table, and sigma, the largest one of the channels, or
+/// 0. Cells are taken as they are: [`BrdfTable::filled`] has none without data.
+pub fn texels<'a>(
+    table: &'a BrdfTable,
+    sigma: Option<&'a SigmaTable>,
+) -> impl Iterator<Item = [f32; 4]> + use<'a> {
+    let layer = |p| (0..N_THETA_D).flat_map(move |d| (0..N_THETA_H).map(move |h| cell_index(h, d, p)));
+    (0..N_PHI_D).flat_map(layer).map(move |cell| {
+        let [r, g, b] = table.values()[cell];
+        [r, g, b, sigma.map_or(0.0, |sigma| sigma.largest(cell))]
+    })
+}
+
+/// Writes the texels.
+fn write_texels(to: &mut impl Write, table: &BrdfTable, sigma: Option<&SigmaTable>) -> io::Result<()> {
+    for x in texels(&table.filled(), sigma).flatten() {
+        to.write_all(&to_half(x.into()).to_le_bytes())?;
     }
-    to.flush()
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use half::f16;
+
     use super::*;
-    use crate::brdf::{HalfDiff, Rgb};
+    use crate::brdf::{HalfDiff, N_CELLS, Rgb};
 
     fn table() -> BrdfTable {
         BrdfTable::from_fn(|a: HalfDiff| -> Rgb { [1.0 + a.phi_d, 5.0 - a.theta_h, 0.1 + a.theta_d] })
