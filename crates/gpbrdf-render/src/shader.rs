@@ -31,14 +31,21 @@ mod part {
     pub(super) const SHADE: &str = include_str!("../shaders/scene/shade.wgsl");
 }
 
+/// The text of the lookup, which `concat!` takes only as a literal.
+macro_rules! lookup {
+    () => {
+        concat!(
+            include_str!("../shaders/shared/table.wgsl"),
+            "\n",
+            include_str!("../shaders/shared/angles.wgsl")
+        )
+    };
+}
+
 /// The functions `gpbrdf_coordinates`, `gpbrdf_lookup` and `gpbrdf_lookup_exact` in WGSL, which turn two
 /// directions into a value of a [`BrdfTexture`](crate::BrdfTexture). The text needs nothing else, and all its
 /// names begin with `gpbrdf_` or `GPBRDF_`: put it in front of any shader.
-pub const LOOKUP_WGSL: &str = concat!(
-    include_str!("../shaders/shared/table.wgsl"),
-    "\n",
-    include_str!("../shaders/shared/angles.wgsl")
-);
+pub const LOOKUP_WGSL: &str = lookup!();
 
 /// [`LOOKUP_WGSL`] and the functions `gpbrdf_eval(table, wi, wo)`, `gpbrdf_sample(table, wo, u)` and
 /// `gpbrdf_pdf(wi, wo)`, which do what [`Material`](gpbrdf_core::Material) does. The text needs one more function,
@@ -54,13 +61,7 @@ pub const LOOKUP_WGSL: &str = concat!(
 ///
 /// All its names begin with `gpbrdf_`, `Gpbrdf` or `GPBRDF_`. An energy-conserving material is one whose table is baked
 /// so: its factors are not applied.
-pub const MATERIAL_WGSL: &str = concat!(
-    include_str!("../shaders/shared/table.wgsl"),
-    "\n",
-    include_str!("../shaders/shared/angles.wgsl"),
-    "\n",
-    include_str!("../shaders/shared/directions.wgsl")
-);
+pub const MATERIAL_WGSL: &str = concat!(lookup!(), "\n", include_str!("../shaders/shared/directions.wgsl"));
 
 /// How the shaders of scenes read materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,6 @@
 mod bake;
 mod fixtures;
 mod golden;
-mod material;
 mod scene;
 #[path = "../support/mod.rs"]
 mod support;
