@@ -5,10 +5,8 @@ use std::path::PathBuf;
 use gpbrdf_core::brdf::materials;
 use gpbrdf_core::formats::read_environment;
 use gpbrdf_core::gp::OptimizeOptions;
-use gpbrdf_core::model::PriorChoice;
 use gpbrdf_core::plan::{AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, tour};
-use gpbrdf_core::prior::Prior;
-use gpbrdf_core::{Error, FitOptions, HalfDiff, Noise, Shape, brdf};
+use gpbrdf_core::{FitOptions, HalfDiff, Noise, Shape, brdf};
 use numpy::PyArray2;
 use pyo3::{Bound, Py, PyAny, PyRef, PyResult, Python, pyfunction};
 
@@ -150,23 +148,11 @@ pub(crate) fn plan(
             Some(path) => Cells::environment(&read_environment(path)?, Cells::COUNT)?,
         };
         let belief = match measured {
-            None => Belief::before(
-                match prior {
-                    PriorChoice::BuiltIn => Some(Prior::built_in()),
-                    PriorChoice::None => None,
-                    PriorChoice::Learned(prior) => Some(prior),
-                }
-                .as_ref(),
-            ),
+            None => Belief::before(prior.prior().as_ref()),
             Some(samples) => {
                 let options = FitOptions { prior, observer: observer.clone(), ..FitOptions::default() };
                 let fitted = gpbrdf_core::fit(samples, &options)?;
-                let hyper = fitted.model.hyper().ok_or_else(|| Error::InvalidArgument {
-                    what: "model of a plan",
-                    expected: "hyper-parameters".to_owned(),
-                    found: "none".to_owned(),
-                })?;
-                Belief::of_fit(&hyper, options.prior(samples).as_ref())?
+                Belief::of_model(&fitted.model, samples, &options)?
             }
         };
         let angles = measured.map_or(&[][..], |samples| &samples.angles);

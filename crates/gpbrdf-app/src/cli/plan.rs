@@ -180,7 +180,7 @@ impl Plan {
             environment: &environment,
             device: &self.instrument.device(),
             cells: &self.cells()?,
-            prior: self.prior.prior()?,
+            prior: self.prior.open()?.prior(),
         };
         let found = terminal.stage("Simulating", || Simulation::new(&source.name, &trial, &batches))?;
         if self.simulation.json {
@@ -249,8 +249,9 @@ impl Plan {
 
     /// Reads what was measured and fits a model to it.
     fn known(&self, terminal: &Terminal) -> Result<Known> {
+        let choice = self.prior.open()?;
         let Some(path) = &self.measured else {
-            let prior = self.prior.prior()?;
+            let prior = choice.prior();
             let belief = Belief::before(prior.as_ref());
             return Ok(Known {
                 belief,
@@ -274,19 +275,15 @@ impl Plan {
                 samples.len()
             ));
         }
-        let options = FitOptions { prior: self.prior.open()?, ..FitOptions::default() };
+        let options = FitOptions { prior: choice, ..FitOptions::default() };
         let fitted = terminal.stage("Fitting", || anyhow::Ok(fit(samples, &options)?))?;
-        let Some(hyper) = fitted.model.hyper() else {
-            bail!("--measured {}: expected a model with hyper-parameters, found none", source.origin());
-        };
-        let prior = options.prior(samples);
         let count = samples.len();
         let origin = source.origin().replace(char::is_control, " ");
         Ok(Known {
-            belief: Belief::of_fit(&hyper, prior.as_ref())?,
+            belief: Belief::of_model(&fitted.model, samples, &options)?,
             angles: samples.angles.clone(),
             measured: format!("{count} samples of {origin}"),
-            prior: described(prior),
+            prior: described(options.prior(samples)),
         })
     }
 

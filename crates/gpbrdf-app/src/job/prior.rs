@@ -38,20 +38,6 @@ impl PriorName {
     }
 }
 
-impl PriorName {
-    /// The prior itself.
-    ///
-    /// # Errors
-    /// Those of [`PriorName::open`].
-    pub(crate) fn prior(&self) -> Result<Option<Arc<Prior>>> {
-        Ok(match self.open()? {
-            PriorChoice::BuiltIn => Some(Prior::built_in()),
-            PriorChoice::None => None,
-            PriorChoice::Learned(prior) => Some(prior),
-        })
-    }
-}
-
 impl FromStr for PriorName {
     type Err = Infallible;
 

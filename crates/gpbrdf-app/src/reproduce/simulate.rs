@@ -129,8 +129,7 @@ impl Trial<'_> {
         let prior = self.prior.clone().map_or(PriorChoice::None, PriorChoice::Learned);
         let options = FitOptions { prior, ..FitOptions::default() };
         let model = fit(samples, &options)?.model;
-        let used = options.prior(samples);
-        let belief = model.hyper().and_then(|hyper| Belief::of_fit(&hyper, used.as_ref()).ok());
+        let belief = Belief::of_model(&model, samples, &options).ok();
         let expected = belief.as_ref().map(|belief| expected_error(belief, &samples.angles, self.cells));
         let (mean, sigma) = (bake_mean(&model), bake_sigma(&model)?);
         let metrics = judge(self.truth, &model, &mean, Some(&sigma), self.environment)?;

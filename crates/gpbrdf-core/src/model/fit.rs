@@ -35,6 +35,18 @@ pub enum PriorChoice {
     Learned(Arc<Prior>),
 }
 
+impl PriorChoice {
+    /// The prior that was chosen, whether or not a fit would use it.
+    #[must_use]
+    pub fn prior(&self) -> Option<Arc<Prior>> {
+        match self {
+            Self::BuiltIn => Some(Prior::built_in()),
+            Self::None => None,
+            Self::Learned(prior) => Some(Arc::clone(prior)),
+        }
+    }
+}
+
 /// Options of [`fit`].
 #[derive(Clone, Debug)]
 pub struct FitOptions {
@@ -118,14 +130,7 @@ impl FitOptions {
             && self.hyper_priors
             && !self.per_channel
             && self.space.is_none_or(InputSpace::is_isotropic);
-        if !(by_solver && is_described) {
-            return None;
-        }
-        match &self.prior {
-            PriorChoice::BuiltIn => Some(Prior::built_in()),
-            PriorChoice::None => None,
-            PriorChoice::Learned(prior) => Some(Arc::clone(prior)),
-        }
+        if by_solver && is_described { self.prior.prior() } else { None }
     }
 
     /// These options with the mean of a prior, if there is one.

@@ -6,8 +6,9 @@ use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::gp::Hyper;
 use crate::kernel::{Kernel, Points, Shape};
+use crate::model::{FitOptions, Model};
 use crate::prior::{Colour, Prior};
-use crate::sample::InputSpace;
+use crate::sample::{InputSpace, SampleSet};
 
 /// The noise variance of measurements that were not made yet.
 const NOISE: f64 = 1e-4;
@@ -80,6 +81,17 @@ impl Belief {
             space,
             noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
         })
+    }
+
+    /// What is known with a model that was fitted to samples with these options.
+    ///
+    /// # Errors
+    /// A model without hyper-parameters, and those of [`Belief::of_fit`].
+    pub fn of_model(model: &Model, samples: &SampleSet, options: &FitOptions) -> Result<Self> {
+        let Some(hyper) = model.hyper() else {
+            return Err(Error::argument("model of a plan", "one with hyper-parameters", "none"));
+        };
+        Self::of_fit(&hyper, options.prior(samples).as_ref())
     }
 
     /// The factors by which variances at directions are larger than the process says: those of the intervals of a fit.

@@ -69,16 +69,10 @@ fn planned(request: &PlanRequest) -> anyhow::Result<Plan> {
     let PlanKey { device, count, prior, .. } = &request.key;
     let candidates = device.geometries(MOST_CANDIDATES)?;
     let cells = Cells::warped_box(Cells::COUNT)?;
-    let nothing = Vec::new();
+    let options = FitOptions { prior: prior.open()?, ..FitOptions::default() };
     let (belief, measured) = match &request.known {
-        None => (Belief::before(prior.prior()?.as_ref()), &nothing),
-        Some((model, samples)) => {
-            let options = FitOptions { prior: prior.open()?, ..FitOptions::default() };
-            let Some(hyper) = model.hyper() else {
-                anyhow::bail!("expected a model with hyper-parameters, found none");
-            };
-            (Belief::of_fit(&hyper, options.prior(samples).as_ref())?, &samples.angles)
-        }
+        None => (Belief::before(options.prior.prior().as_ref()), &[][..]),
+        Some((model, samples)) => (Belief::of_model(model, samples, &options)?, &samples.angles[..]),
     };
     Ok(plan(&belief, measured, &candidates, &cells, Goal::Count((*count).min(candidates.len())))?)
 }
