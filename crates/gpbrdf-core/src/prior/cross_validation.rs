@@ -8,6 +8,7 @@ use super::Prior;
 use super::calibration::Calibration;
 use super::learn::{LearnOptions, Library, family, learn_functions};
 use crate::base::error::Result;
+use crate::brdf::Rgb;
 use crate::brdf::angles::HalfDiff;
 use crate::model::{FitOptions, IntervalOf, PriorChoice, fit};
 use crate::sample::layout::hemisphere_directions;
@@ -61,8 +62,9 @@ pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<C
             let options = FitOptions { prior: PriorChoice::Learned(prior), ..FitOptions::default() };
             let mut errors = Vec::new();
             for i in own {
+                let truth = library.values_at(i, library.centres());
                 for count in SAMPLES {
-                    errors.extend(errors_of(library, i, count, &options)?);
+                    errors.extend(errors_of((library, i), &truth, count, &options)?);
                 }
             }
             Ok(errors)
@@ -72,10 +74,11 @@ pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<C
     Ok(if errors.is_empty() { Calibration::NONE } else { Calibration::measured(&errors) })
 }
 
-/// The errors of a material's prediction from random directions, at the centres, in standard deviations.
+/// The errors of a material's prediction from random directions, at the centres, where its values are `truth`, in
+/// standard deviations.
 fn errors_of(
-    library: &Library,
-    material: usize,
+    (library, material): (&Library, usize),
+    truth: &[Rgb],
     count: usize,
     options: &FitOptions,
 ) -> Result<Vec<(HalfDiff, f64)>> {
@@ -86,7 +89,6 @@ fn errors_of(
         pairs.into_iter().zip(values).map(|([wi, wo], value)| Sample { wi, wo, value }).collect();
     let model = fit(&samples, options)?.model;
     let centres = library.centres();
-    let truth = library.values_at(material, centres);
     let predicted = model.predict_target(centres);
     let variances = model.predict_variance(centres, IntervalOf::Latent)?;
     let rows = centres.iter().zip(truth).zip(predicted.iter().zip(&variances));
