@@ -445,7 +445,7 @@ impl Viewer {
             pane.request(&mut self.context);
         }
         let watched = self.context.documents.iter().filter(|d| self.settings.watch && d.is_scattered());
-        self.watcher.watch(watched.filter_map(|document| document.source.path.clone()).collect());
+        self.watcher.watch(&watched.filter_map(|document| document.source.path.as_ref()).collect::<Vec<_>>());
     }
 
     /// The whole window.

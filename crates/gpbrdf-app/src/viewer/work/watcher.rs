@@ -33,11 +33,11 @@ impl Watcher {
     }
 
     /// Watches these files in place of those before.
-    pub(crate) fn watch(&mut self, files: Vec<PathBuf>) {
-        if files != self.watched {
-            self.watched.clone_from(&files);
+    pub(crate) fn watch(&mut self, files: &[&PathBuf]) {
+        if !self.watched.iter().eq(files.iter().copied()) {
+            self.watched = files.iter().copied().cloned().collect();
             // The thread ends only with the watcher.
-            let _sent = self.files.send(files);
+            let _sent = self.files.send(self.watched.clone());
         }
     }
 }
@@ -93,7 +93,7 @@ mod tests {
         std::fs::write(&other, "1").unwrap();
         let (outbox, inbox) = Outbox::channel(&(Arc::new(|| {}) as super::super::outbox::Waker));
         let mut watcher = Watcher::new(outbox).unwrap();
-        watcher.watch(vec![own.clone()]);
+        watcher.watch(&[&own]);
         // The thread has taken the list before the first change.
         assert!(inbox.recv_timeout(4 * INTERVAL).is_err());
         std::fs::write(&other, "22").unwrap();

@@ -83,6 +83,8 @@ pub(crate) struct Directions {
     requested: Option<PlanKey>,
     /// Whether the last request has been answered.
     is_answered: bool,
+    /// Whether the view was drawn in this frame.
+    is_shown: bool,
     /// The rank that the pointer is over in the list.
     pointed: Option<usize>,
 }
@@ -93,7 +95,8 @@ impl Directions {
         let (outbox, inbox) = start.channel();
         let worker = spawn(outbox.map(|planned| Message::Planned(Box::new(planned))))?;
         let look = Look::default();
-        Ok(Self { look, outbox, inbox, worker, requested: None, is_answered: true, pointed: None })
+        let (requested, is_answered, is_shown, pointed) = (None, true, false, None);
+        Ok(Self { look, outbox, inbox, worker, requested, is_answered, is_shown, pointed })
     }
 }
 
@@ -149,6 +152,7 @@ impl Pane for Directions {
     }
 
     fn ui(&mut self, ui: &mut Ui, cx: &mut PaneContext) {
+        self.is_shown = true;
         self.tools_ui(ui);
         let Some(document) = cx.documents.selected() else { return };
         worth_ui(ui, document);
@@ -170,7 +174,9 @@ impl Pane for Directions {
     }
 
     fn request(&mut self, cx: &mut PaneContext) {
-        let Some(document) = cx.documents.selected() else { return };
+        let is_shown = std::mem::take(&mut self.is_shown);
+        // Plans of what is measured are on slices, too.
+        let Some(document) = cx.documents.selected().filter(|d| is_shown || d.is_scattered()) else { return };
         let request = PlanRequest::of(document, self.look.device(), self.look.count());
         let Some(request) = request.filter(|request| self.requested.as_ref() != Some(&request.key)) else {
             return;

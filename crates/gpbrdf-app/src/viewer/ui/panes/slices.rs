@@ -62,15 +62,20 @@ const REGIONS: [(&str, f64, f64); 4] = [
 ];
 
 /// What the pane remembers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 struct Look {
     #[serde(flatten)]
     slices: SliceLook,
     samples: bool,
-    /// Whether planned directions are not shown.
-    no_plan: bool,
+    plan: bool,
     regions: bool,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { slices: SliceLook::default(), samples: false, plan: true, regions: false }
+    }
 }
 
 /// What the pane is sent.
@@ -216,7 +221,7 @@ impl Slices {
     }
 
     fn tools_ui(&mut self, ui: &mut Ui) {
-        let Look { slices: look, samples, no_plan, regions } = &mut self.look;
+        let Look { slices: look, samples, plan, regions } = &mut self.look;
         let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
         let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
         let wide = ui.available_width() > WIDE;
@@ -239,10 +244,7 @@ impl Slices {
                 ui.checkbox(&mut look.chroma, "Chroma")
                     .on_hover_text("Colours divided by their largest channel");
                 ui.checkbox(samples, "Samples").on_hover_text("Where it was measured");
-                let mut plan = !*no_plan;
-                ui.checkbox(&mut plan, "Planned")
-                    .on_hover_text("Where to measure next, of measured materials");
-                *no_plan = !plan;
+                ui.checkbox(plan, "Planned").on_hover_text("Where to measure next, of measured materials");
                 ui.checkbox(regions, "Regions").on_hover_text("Names of the regions");
                 if !wide {
                     ui.set_min_width(280.0);
@@ -345,7 +347,7 @@ impl Grid<'_> {
 
     /// The planned directions with their ranks; those far from the slice are faint.
     fn draw_plan(&self, plot: &mut PlotUi<'_>) {
-        let Some(plan) = self.document.plan().filter(|_| self.document.is_scattered() && !self.look.no_plan)
+        let Some(plan) = self.document.plan().filter(|_| self.document.is_scattered() && self.look.plan)
         else {
             return;
         };
