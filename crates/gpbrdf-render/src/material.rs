@@ -18,7 +18,6 @@ pub fn density_buffer(context: &Context, densities: &DirectionDensities) -> Resu
 #[cfg(test)]
 mod tests {
     use gpbrdf_core::base::SplitMix64;
-    use gpbrdf_core::material::{COLUMNS, COSINE_SHARE, ROWS, VIEWS};
     use gpbrdf_core::{BrdfTable, Material, MaterialOptions, SampledDirection, Source};
 
     use super::*;
@@ -49,16 +48,6 @@ mod tests {
     ";
 
     const COUNT: usize = 1 << 14;
-
-    #[test]
-    fn the_shader_has_the_sizes_of_the_core() {
-        for (name, value) in [("VIEWS", VIEWS), ("ROWS", ROWS), ("COLUMNS", COLUMNS)] {
-            let line = format!("const GPBRDF_{name}: u32 = {value}u;");
-            assert!(MATERIAL_WGSL.contains(&line), "{line}");
-        }
-        let line = format!("const GPBRDF_COSINE_SHARE: f32 = {COSINE_SHARE};");
-        assert!(MATERIAL_WGSL.contains(&line), "{line}");
-    }
 
     #[expect(clippy::cast_possible_truncation, reason = "materials are in single precision")]
     fn viewer(random: &mut SplitMix64) -> [f32; 4] {

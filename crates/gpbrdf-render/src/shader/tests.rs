@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use gpbrdf_core::material::{COLUMNS, COSINE_SHARE, ROWS, VIEWS};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::*;
@@ -25,7 +26,10 @@ struct Variant {
 /// All shaders, parsed and validated.
 fn variants() -> Vec<Variant> {
     let (kernel, parameters) = kernel_source::every_shape();
+    let densities = "@group(0) @binding(1) var<storage, read> densities: array<f32>;
+        fn gpbrdf_density(index: u32) -> f32 { return densities[index]; }\n";
     let sources = [
+        ("material", format!("{densities}{MATERIAL_WGSL}")),
         ("evaluate", evaluate_wgsl()),
         ("gbuffer", gbuffer()),
         ("sampler, exact", sampler(Lookup::Exact)),
@@ -173,6 +177,10 @@ fn mirrored() -> BTreeMap<&'static str, Vec<f64>> {
     let position = |map| COLOUR_MAPS.iter().position(|&other| other == map).unwrap();
     [
         ("GPBRDF_PI", vec![f64::from(std::f32::consts::PI)]),
+        ("GPBRDF_VIEWS", single(VIEWS)),
+        ("GPBRDF_ROWS", single(ROWS)),
+        ("GPBRDF_COLUMNS", single(COLUMNS)),
+        ("GPBRDF_COSINE_SHARE", vec![f64::from(COSINE_SHARE)]),
         ("N_THETA_H", single(gpbrdf_core::brdf::N_THETA_H)),
         ("N_THETA_D", single(gpbrdf_core::brdf::N_THETA_D)),
         ("N_PHI_D", single(gpbrdf_core::brdf::N_PHI_D)),
@@ -210,8 +218,11 @@ fn mirrored() -> BTreeMap<&'static str, Vec<f64>> {
 }
 
 /// The constants that only WGSL knows, or that Rust composes.
-const WGSL_ONLY: [&str; 8] = [
+const WGSL_ONLY: [&str; 11] = [
     "ENVIRONMENT_SHARES",
+    "GPBRDF_CONDITIONAL",
+    "GPBRDF_LEAST",
+    "GPBRDF_MARGINAL",
     "RING_SHARES",
     "LEAST_COSINE",
     "NEUTRAL",
