@@ -10,7 +10,7 @@ use crate::brdf::angles::{HalfDiff, check_finite};
 use crate::gp::dense::row_major;
 use crate::gp::hyper::{Hyper, length_scale_report};
 use crate::gp::posterior::{DeviceForm, KernelSum, KernelSums, Posterior};
-use crate::gp::scattered::ScatteredGp;
+use crate::gp::scattered::{ScatteredGp, Widening};
 use crate::gp::solver::Solver;
 use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::kernel::Kernel;
@@ -73,6 +73,8 @@ struct PartHeader {
     kernel: Kernel,
     noise_variance: f64,
     basis_variance: f64,
+    #[serde(default)]
+    widening: Widening,
 }
 
 /// Names of the parts in tensors.
@@ -106,12 +108,13 @@ pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn 
         }
         let angles: Vec<HalfDiff> =
             rows.iter().map(|&[theta_h, theta_d, phi_d]| HalfDiff { theta_h, theta_d, phi_d }).collect();
-        let PartHeader { space, kernel, noise_variance, basis_variance } = header;
+        let PartHeader { space, kernel, noise_variance, basis_variance, widening } = header;
         let points = space.points(&angles);
         let basis = (adapted.features(colour, &angles), adapted.n_functions(colour), basis_variance);
         let channels = colour.rows().len();
         let gp = ScatteredGp::with_basis(kernel, noise_variance, noise, points, basis, channels, weights);
-        made.push(Part { gp: gp.map_err(|e| tensors.damaged(e))?, space, angles });
+        let gp = gp.and_then(|gp| gp.widened(widening)).map_err(|e| tensors.damaged(e))?;
+        made.push(Part { gp, space, angles });
     }
     match <[Part; 2]>::try_from(made) {
         Ok(parts) => Ok(Arc::new(LearnedPosterior::new(prior, (library_weights, adapted), parts))),
@@ -282,6 +285,7 @@ impl Posterior for LearnedPosterior {
             kernel: gp.kernel().clone(),
             noise_variance: gp.noise_variance(),
             basis_variance: gp.basis_variance(),
+            widening: gp.widening(),
         });
         crate::gp::tensors::header(&Header { prior, library_weights: self.weights.clone(), parts })
     }

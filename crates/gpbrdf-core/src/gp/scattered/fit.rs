@@ -11,7 +11,7 @@ use super::neighbours::{Embedded, Neighbours, scrambled_order};
 use super::preconditioner::Preconditioner;
 use super::product::Covariance;
 use super::vecchia::{Targets, log_likelihood};
-use super::{NEAREST, ScatteredGp};
+use super::{NEAREST, ScatteredGp, Widening};
 use crate::base::error::Result;
 use crate::base::simd::dot;
 use crate::base::watch::Watch;
@@ -333,12 +333,32 @@ impl State {
         Ok(changed)
     }
 
+    /// How much wider intervals must be than the process says.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
+    pub(super) fn widening(&self, data: &Data, space: InputSpace, watch: &Watch) -> Result<Widening> {
+        let (_, all) = data.noise(self.noise_variance, &self.weights);
+        Widening::measured(&self.process(data, &all), &data.y, &self.weights, space, watch)
+    }
+
     /// Adds what the samples say about themselves to a report: predictions from all others, and weights.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
-    pub(super) fn report_samples(&self, data: &Data, watch: &Watch, report: &mut FitReport) -> Result<()> {
-        let (residuals, variances, _) = self.leave_one_out(data, watch)?;
+    pub(super) fn report_samples(
+        &self,
+        data: &Data,
+        widening: Widening,
+        watch: &Watch,
+        report: &mut FitReport,
+    ) -> Result<()> {
+        let (residuals, mut variances, _) = self.leave_one_out(data, watch)?;
+        let prior = self.kernel.prior_variance();
+        for (i, variance) in variances.iter_mut().enumerate() {
+            let noise = self.noise_variance + data.known_noise[i];
+            *variance = widening.widened(data.x[3 * i], (*variance - noise).max(0.0), prior) + noise;
+        }
         let density = residuals.chunks(data.y.len()).zip(&variances).map(|(row, v)| {
             row.iter().map(|r| -0.5 * ((std::f64::consts::TAU * v).ln() + r * r / v)).sum::<f64>()
         });

@@ -23,6 +23,7 @@ mod product;
 pub(crate) mod solve;
 #[cfg(feature = "fit")]
 mod vecchia;
+mod widening;
 
 use std::sync::OnceLock;
 
@@ -31,6 +32,7 @@ use rayon::prelude::*;
 use self::conditional::{Basis, Process, Scratch};
 use self::neighbours::Embedded;
 use self::preconditioner::{FarField, Preconditioner};
+pub(crate) use self::widening::Widening;
 use crate::base::error::{Error, Result};
 use crate::base::watch::Watch;
 use crate::kernel::{Kernel, Points};
@@ -60,6 +62,8 @@ pub(crate) struct ScatteredGp {
     channels: usize,
     /// `K^-1 y`, one column per channel.
     weights: Vec<f64>,
+    /// What regions of samples that are left out say about variances.
+    widening: Widening,
     /// What variances need; a process that was loaded from a file computes it when it is first needed.
     far_field: OnceLock<FarField>,
 }
@@ -104,6 +108,7 @@ impl ScatteredGp {
             embedded,
             channels,
             weights,
+            widening: Widening::default(),
             far_field: OnceLock::new(),
         })
     }
@@ -169,6 +174,26 @@ impl ScatteredGp {
         self.basis.weighted_sum(self.basis_variance, &self.weights[channel * n..(channel + 1) * n])
     }
 
+    /// The process with wider intervals.
+    ///
+    /// # Errors
+    /// Factors that are not finite numbers of at least 1.
+    pub(crate) fn widened(self, widening: Widening) -> Result<Self> {
+        if !widening.is_valid() {
+            return Err(Error::argument(
+                "widening of intervals",
+                "factors of at least 1",
+                format!("{widening:?}"),
+            ));
+        }
+        Ok(Self { widening, ..self })
+    }
+
+    /// How much wider intervals are than without what regions that are left out say.
+    pub(crate) fn widening(&self) -> Widening {
+        self.widening
+    }
+
     /// Takes what variances need from the search for the weights.
     #[cfg(feature = "fit")]
     fn with_far_field(self, far_field: FarField) -> Self {
@@ -192,6 +217,7 @@ impl ScatteredGp {
                 self.far_field.get_or_init(|| far_field)
             }
         };
+        let prior = self.kernel.prior_variance();
         let nearest = self.embedded.nearest_to(&Embedded::new(x, &self.kernel), NEAREST, &watch)?;
         let variances = x
             .par_chunks(self.kernel.dimension())
@@ -200,7 +226,8 @@ impl ScatteredGp {
                 || Scratch::new(NEAREST),
                 |scratch, (j, point)| {
                     let own = &basis[j * self.basis.count..(j + 1) * self.basis.count];
-                    far_field.variance(&process, (point, own), nearest.of(j), scratch)
+                    let variance = far_field.variance(&process, (point, own), nearest.of(j), scratch);
+                    self.widening.widened(point[0], variance, prior)
                 },
             )
             .collect();

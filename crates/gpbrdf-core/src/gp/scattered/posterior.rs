@@ -5,8 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::ScatteredGp;
 use super::conditional::Basis;
+use super::{ScatteredGp, Widening};
 use crate::base::error::Result;
 use crate::brdf::angles::{HalfDiff, check_finite};
 use crate::gp::dense::row_major;
@@ -34,18 +34,21 @@ struct Header {
     kernel: Kernel,
     noise_variance: f64,
     channels: usize,
+    #[serde(default)]
+    widening: Widening,
 }
 
 /// Reads a process that [`Posterior::save`] has written.
 pub(crate) fn load(header: Value, tensors: &TensorReader<'_>) -> Result<Arc<dyn Posterior>> {
-    let Header { space, kernel, noise_variance, channels } = tensors.header(header)?;
+    let Header { space, kernel, noise_variance, channels, widening } = tensors.header(header)?;
     space.validate().map_err(|e| tensors.damaged(e))?;
     if kernel.dimension() != 3 {
         return Err(tensors.wrong("a kernel of 3 coordinates", kernel.dimension().to_string()));
     }
     let (x, noise, weights) = (tensors.read("x")?, tensors.read("noise")?, tensors.read("weights")?);
     let gp = ScatteredGp::new(kernel, noise_variance, noise, x, (Basis::default(), 0.0), channels, weights);
-    Ok(Arc::new(ScatteredPosterior { gp: gp.map_err(|e| tensors.damaged(e))?, space }))
+    let gp = gp.and_then(|gp| gp.widened(widening)).map_err(|e| tensors.damaged(e))?;
+    Ok(Arc::new(ScatteredPosterior { gp, space }))
 }
 
 impl Posterior for ScatteredPosterior {
@@ -114,6 +117,7 @@ impl Posterior for ScatteredPosterior {
             kernel: self.gp.kernel.clone(),
             noise_variance: self.gp.noise_variance,
             channels,
+            widening: self.gp.widening,
         })
     }
 

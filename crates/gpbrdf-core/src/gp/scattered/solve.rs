@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::cost::search_share;
 use super::fit::{Data, Search, State};
 use super::posterior::ScatteredPosterior;
-use super::{ScatteredGp, exact};
+use super::{ScatteredGp, Widening, exact};
 use crate::base::error::{Error, Result};
 use crate::base::simd::dot;
 use crate::brdf::angles::HalfDiff;
@@ -37,13 +37,13 @@ pub(crate) struct Conditioned {
 /// Like [`fit`], with a basis if the problem has one.
 pub(crate) fn fit_process(problem: &Problem<'_>) -> Result<(Conditioned, FitReport)> {
     problem.noise.validate()?;
-    let Found { data, state, space, mut report } = match problem.basis {
+    let Found { data, state, space, widening, mut report } = match problem.basis {
         Some(basis) if problem.angles.len() > exact::MOST_SAMPLES => search_with_basis(problem, basis)?,
         _ => search(problem)?,
     };
     let (gp, value) = state.condition(&problem.watch.part(left_out_share(problem), 1.0), &data)?;
     report.log_marginal_likelihood = value;
-    Ok((Conditioned { gp, space, order: data.order().collect() }, report))
+    Ok((Conditioned { gp: gp.widened(widening)?, space, order: data.order().collect() }, report))
 }
 
 /// Hyper-parameters and weights, what was searched, and how.
@@ -51,6 +51,7 @@ struct Found {
     data: Data,
     state: State,
     space: InputSpace,
+    widening: Widening,
     report: FitReport,
 }
 
@@ -85,9 +86,11 @@ fn search(problem: &Problem<'_>) -> Result<Found> {
     let space = best.space;
     let (data, state, mut report) = best.finish()?;
     let searched = search_share(problem.angles.len());
-    state.report_samples(&data, &problem.watch.part(searched, left_out_share(problem)), &mut report)?;
+    let watch = problem.watch.part(searched, left_out_share(problem));
+    let widening = state.widening(&data, space, &watch.part(0.0, 0.1))?;
+    state.report_samples(&data, widening, &watch.part(0.1, 1.0), &mut report)?;
     report.evaluations += evaluations;
-    Ok(Found { data, state, space, report })
+    Ok(Found { data, state, space, widening, report })
 }
 
 /// Like [`search`] for many samples with a basis, which correlates all of them, so that neighbours do not tell its
@@ -127,7 +130,8 @@ fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Foun
     let data = data(problem, rest.space)?;
     let state = rest.state.moved(&rest.data, &data, few.state.basis_variance);
     let evaluations = rest.report.evaluations + few.report.evaluations;
-    Ok(Found { data, state, space: rest.space, report: FitReport { evaluations, ..rest.report } })
+    let report = FitReport { evaluations, ..rest.report };
+    Ok(Found { data, state, space: rest.space, widening: rest.widening, report })
 }
 
 /// Conditions the process at known hyper-parameters. The second value is the log marginal likelihood there.
@@ -142,8 +146,9 @@ pub(crate) fn condition_process(problem: &Problem<'_>, hyper: &Hyper) -> Result<
     let data = data(problem, space)?;
     let basis_variance = hyper.basis_variance.unwrap_or(1.0);
     let state = State::known(hyper.kernel.clone(), hyper.noise_variance, basis_variance, &data);
-    let (gp, value) = state.condition(problem.watch, &data)?;
-    Ok((Conditioned { gp, space, order: data.order().collect() }, value))
+    let widening = state.widening(&data, space, &problem.watch.part(0.0, 0.1))?;
+    let (gp, value) = state.condition(&problem.watch.part(0.1, 1.0), &data)?;
+    Ok((Conditioned { gp: gp.widened(widening)?, space, order: data.order().collect() }, value))
 }
 
 /// The samples in the coordinates of a space.

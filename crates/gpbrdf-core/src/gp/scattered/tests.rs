@@ -171,7 +171,9 @@ fn few_samples_are_left_out_exactly() {
     let dense = dense.unwrap();
     let mut report = FitReport::default();
     let data = Data::new(&points, &y, &[], None);
-    State::known(kernel(), 0.01, 0.0, &data).report_samples(&data, &Watch::default(), &mut report).unwrap();
+    State::known(kernel(), 0.01, 0.0, &data)
+        .report_samples(&data, Widening::default(), &Watch::default(), &mut report)
+        .unwrap();
     let found = report.leave_one_out.unwrap();
     for (a, b) in found.residuals.iter().zip(&dense.residuals) {
         assert!((a - b).abs() < 1e-7, "{a} {b}");
@@ -217,7 +219,7 @@ fn outliers_are_found_and_nothing_else() {
             let data = Data::new(&points, &y, &[], None);
             let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
             let (data, state, mut report) = search.finish().unwrap();
-            state.report_samples(&data, &Watch::default(), &mut report).unwrap();
+            state.report_samples(&data, Widening::default(), &Watch::default(), &mut report).unwrap();
             let (gp, _) = state.condition(problem.watch, &data).unwrap();
             (gp.noise_variance.sqrt(), report)
         })
@@ -266,4 +268,67 @@ fn angles_are_chords_and_broken_parts_are_refused() {
     };
     assert!(make(vec![0.1; 2], 2).is_ok());
     assert!(make(vec![0.1; 2], 3).is_err() && make(vec![-0.1; 2], 2).is_err() && make(vec![], 0).is_err());
+}
+
+#[test]
+fn regions_that_are_left_out_leave_what_a_fit_without_them_predicts() {
+    let (points, y) = data(60, 0.1);
+    let (x, kernel) = (points.as_flattened(), kernel());
+    let noise = vec![0.02; 60];
+    let process =
+        Process { kernel: &kernel, x, noise: &noise, basis: &Basis::default(), basis_variance: 0.0 };
+    let embedded = Embedded::new(x, &kernel);
+    let inverse = exact::Inverse::new(&process, &y).unwrap();
+    for (centre, radius) in [(3, 0.0), (17, 0.4), (40, 0.8)] {
+        let inside = embedded.within(centre, radius);
+        let mut outside = embedded.nearest_outside(centre, radius, 60);
+        outside.sort_unstable();
+        let both: usize = inside.len() + outside.len();
+        assert!(both == 60 && inside[0] as usize == centre && outside.iter().all(|i| !inside.contains(i)));
+        assert!((radius > 0.0) == (inside.len() > 1), "{radius}: {}", inside.len());
+        // Another solver, which sees only what is outside.
+        let of = |i: u32| points[i as usize];
+        let known: Vec<f64> = outside.iter().flat_map(|&i| of(i)).collect();
+        let targets: Vec<f64> = outside.iter().flat_map(|&i| y.iter().map(move |y| y[i as usize])).collect();
+        let dense = DenseGp::fit_at(&known, &targets, CHANNELS, kernel.clone(), 0.02).unwrap();
+        let mean = dense.predict_mean(&points[centre]).unwrap();
+        let variance = dense.predict_variance_latent(&points[centre]).unwrap()[0];
+        let (residuals, found) = inverse.left_out(&inside);
+        assert!((found - 0.02 - variance).abs() < 1e-8, "{found} {variance}");
+        for (c, residual) in residuals.iter().enumerate() {
+            assert!((y[c][centre] - mean[c] - residual).abs() < 1e-8, "{residual}");
+        }
+        let mut scratch = Scratch::new(60);
+        let (b, latent) = scratch.condition(&process, centre, &outside);
+        let near: f64 = b.iter().zip(&outside).map(|(b, &j)| b * y[0][j as usize]).sum();
+        assert!((latent - variance).abs() < 1e-8 && (near - mean[0]).abs() < 1e-8);
+    }
+}
+
+/// A function with steep bumps in a grid, all but one of them sampled.
+#[test]
+fn an_interval_where_no_sample_is_near_expects_what_happens_elsewhere() {
+    let mut random = SplitMix64::new(4);
+    let bump = |p: &[f64; 3]| -> f64 {
+        let to = |k: usize| (4.0 * p[k]).fract() - 0.5;
+        (-(to(0) * to(0) + to(1) * to(1)) / 0.05).exp()
+    };
+    let hole = [0.375, 0.375, 0.5];
+    let is_near = |p: &[f64; 3]| (p[0] - hole[0]).hypot(p[1] - hole[1]) < 0.09;
+    let points: Vec<[f64; 3]> = (0..1200)
+        .map(|_| [random.next_unit(), random.next_unit(), random.next_unit()])
+        .filter(|p| !is_near(p))
+        .collect();
+    let y = vec![points.iter().map(|p| bump(p) + 1e-3 * random.next_normal()).collect::<Vec<f64>>()];
+    let kernel = Kernel::ard(0.2, Shape::Matern52, &[0.35, 0.35, 3.0]);
+    let data = Data::new(&points, &y, &[], None);
+    let state = State::known(kernel, 1e-6, 0.0, &data);
+    let widening = state.widening(&data, InputSpace::PolarAngles, &Watch::default()).unwrap();
+    let (gp, _) = state.condition(&Watch::default(), &data).unwrap();
+    let error = (gp.mean_at(&hole)[0] - bump(&hole)).abs();
+    let sure = gp.variance_at(&hole, &[]).unwrap()[0].sqrt();
+    let widened = gp.widened(widening).unwrap().variance_at(&hole, &[]).unwrap()[0].sqrt();
+    // The top of a bump is the worst place for a hole, and most regions that are left out have none in their middle.
+    assert!(error > 20.0 * sure, "{error} {sure}");
+    assert!(error < 6.0 * widened && widened < error, "{error} {sure} {widened}");
 }
