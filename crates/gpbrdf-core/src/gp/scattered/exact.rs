@@ -76,46 +76,6 @@ pub(super) fn leave_one_out(process: &Process<'_>, y: &[Vec<f64>]) -> Result<(Ve
     Ok((residuals.collect(), variances))
 }
 
-/// The inverse of the covariance of all measurements, and `K^-1 y`.
-pub(super) struct Inverse {
-    inverse: Vec<f64>,
-    /// One column per channel.
-    weights: Vec<f64>,
-    n: usize,
-}
-
-impl Inverse {
-    /// # Errors
-    /// A covariance that is not positive definite.
-    pub(super) fn new(process: &Process<'_>, y: &[Vec<f64>]) -> Result<Self> {
-        let n = process.noise.len();
-        let factor = factor(process)?;
-        let mut weights = y.concat();
-        solve(&factor, n, &mut weights);
-        Ok(Self { inverse: inverse(&factor, n), weights, n })
-    }
-
-    /// The first of some samples as it is predicted from all others but these: one residual per channel, and the
-    /// variance, noise of the sample included. With the block `M` of the inverse that belongs to the samples, and the
-    /// solution `x` of `M x = e_1`, they are `x^T a` and `x_1`. Cost: `O(m^3)` for `m` samples.
-    pub(super) fn left_out(&self, samples: &[u32]) -> (Vec<f64>, f64) {
-        let m = samples.len();
-        let mut block = vec![0.0; m * m];
-        for (column, &j) in block.chunks_mut(m).zip(samples) {
-            for (value, &i) in column.iter_mut().zip(samples) {
-                *value = self.inverse[i as usize * self.n + j as usize];
-            }
-        }
-        let mut x = vec![0.0; m];
-        x[0] = 1.0;
-        // A block of a positive definite matrix is positive definite.
-        factorize(&mut block, m);
-        solve(&block, m, &mut x);
-        let residual = |w: &[f64]| x.iter().zip(samples).map(|(x, &i)| x * w[i as usize]).sum();
-        (self.weights.chunks(self.n).map(residual).collect(), x[0])
-    }
-}
-
 /// `K^-1 y` of every channel, one after the other.
 ///
 /// # Errors

@@ -333,11 +333,15 @@ impl State {
         Ok(changed)
     }
 
-    /// How much wider intervals must be than the process says.
+    /// How much wider intervals must be than the process says. Not with a basis, which correlates all samples: a learned
+    /// prior knows from other materials how wide they must be.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
     pub(super) fn widening(&self, data: &Data, space: InputSpace, watch: &Watch) -> Result<Widening> {
+        if data.basis.count > 0 {
+            return Ok(Widening::default());
+        }
         let (_, all) = data.noise(self.noise_variance, &self.weights);
         Widening::measured(&self.process(data, &all), &data.y, &self.weights, space, watch)
     }

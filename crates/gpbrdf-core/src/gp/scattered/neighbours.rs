@@ -112,28 +112,14 @@ impl Embedded {
         found.truncate(count);
     }
 
-    /// Squared distances from point `i` to all points.
+    /// The `count` points that are nearest to point `i` among the others that are farther from it than `radius`; among
+    /// all others where that is 0.
     #[cfg(feature = "fit")]
-    fn squared_distances(&self, i: usize) -> Vec<f64> {
+    pub(super) fn nearest_outside(&self, i: usize, radius: f64, count: usize) -> Vec<u32> {
         let mut squares = vec![0.0; self.len];
         for axis in &self.axes {
             squares.iter_mut().zip(axis).for_each(|(square, x)| *square += (x - axis[i]) * (x - axis[i]));
         }
-        squares
-    }
-
-    /// Point `i` itself, first, and all other points that are no farther from it than a radius above 0.
-    #[cfg(feature = "fit")]
-    pub(super) fn within(&self, i: usize, radius: f64) -> Vec<u32> {
-        let squares = self.squared_distances(i);
-        let others = (0..self.len).filter(|&j| j != i && radius > 0.0 && squares[j] <= radius * radius);
-        std::iter::once(i).chain(others).map(index).collect()
-    }
-
-    /// The `count` points that are nearest to point `i` among those that [`Embedded::within`] leaves.
-    #[cfg(feature = "fit")]
-    pub(super) fn nearest_outside(&self, i: usize, radius: f64, count: usize) -> Vec<u32> {
-        let squares = self.squared_distances(i);
         let is_outside = |j: &usize| *j != i && (radius == 0.0 || squares[*j] > radius * radius);
         let mut found: Vec<(f64, u32)> =
             (0..self.len).filter(is_outside).map(|j| (squares[j], index(j))).collect();

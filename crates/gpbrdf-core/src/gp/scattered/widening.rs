@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 #[cfg(feature = "fit")]
 use {
+    super::NEAREST,
     super::conditional::{Process, Scratch},
     super::neighbours::Embedded,
-    super::{NEAREST, exact},
     crate::base::error::Result,
     crate::base::watch::Watch,
     crate::brdf::angles::HalfDiff,
@@ -117,8 +117,7 @@ struct Predicted {
 #[cfg(feature = "fit")]
 impl Widening {
     /// The factors for targets `y`, one column per channel, in coordinates of a space. Samples whose weights are below 1
-    /// are not predicted. Cost: up to 2,700 conditionals on 48 samples and as many times the distances to all of them;
-    /// with a basis and at most 512 samples an inverse of their covariance instead.
+    /// are not predicted. Cost: up to 2,700 conditionals on 48 samples and as many times the distances to all of them.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
@@ -138,9 +137,6 @@ impl Widening {
         let centres: Vec<usize> = (trusted().filter(|&i| in_highlight(i)).take(of_highlight))
             .chain(trusted().filter(|&i| !in_highlight(i)).take(of_rest))
             .collect();
-        let whole = (process.basis.count > 0 && weights.len() <= exact::MOST_SAMPLES)
-            .then(|| exact::Inverse::new(process, y).ok())
-            .flatten();
         let steps = watch.steps(centres.len());
         let predicted = centres
             .into_par_iter()
@@ -148,35 +144,22 @@ impl Widening {
                 || Scratch::new(NEAREST),
                 |scratch, centre| {
                     steps.take()?;
-                    let found = RADII.iter().filter_map(|radius| match &whole {
-                        Some(inverse) => {
-                            let inside = embedded.within(centre, *radius);
-                            (inside.len() + FEWEST <= weights.len()).then(|| {
-                                let (residuals, variance) = inverse.left_out(&inside);
-                                let noise = process.noise[centre];
-                                (residuals, (variance - noise).max(0.0))
-                            })
+                    let found = RADII.iter().filter_map(|radius| {
+                        let given = embedded.nearest_outside(centre, *radius, NEAREST);
+                        if given.len() < FEWEST {
+                            return None;
                         }
-                        None => {
-                            let given = embedded.nearest_outside(centre, *radius, NEAREST);
-                            (given.len() >= FEWEST).then(|| {
-                                let (b, latent) = scratch.condition(process, centre, &given);
-                                let residual = |y: &Vec<f64>| {
-                                    let mean: f64 =
-                                        b.iter().zip(&given).map(|(b, &j)| b * y[j as usize]).sum();
-                                    y[centre] - mean
-                                };
-                                (y.iter().map(residual).collect(), latent)
-                            })
-                        }
+                        let (b, latent) = scratch.condition(process, centre, &given);
+                        let mean =
+                            |y: &[f64]| b.iter().zip(&given).map(|(b, &j)| b * y[j as usize]).sum::<f64>();
+                        Some(Predicted {
+                            in_highlight: in_highlight(centre),
+                            residuals: y.iter().map(|y| y[centre] - mean(y)).collect(),
+                            latent,
+                            noise: process.noise[centre],
+                        })
                     });
-                    let with_noise = |(residuals, latent)| Predicted {
-                        in_highlight: in_highlight(centre),
-                        residuals,
-                        latent,
-                        noise: process.noise[centre],
-                    };
-                    Ok(found.map(with_noise).collect())
+                    Ok(found.collect())
                 },
             )
             .collect::<Result<Vec<Vec<Predicted>>>>()?;
