@@ -333,8 +333,8 @@ impl State {
         Ok(changed)
     }
 
-    /// How much wider intervals must be than the process says. Not with a basis, which correlates all samples: a learned
-    /// prior knows from other materials how wide they must be.
+    /// How much wider intervals must be than the process says. Not with a basis, which correlates all samples: a
+    /// learned prior knows from other materials how wide they must be.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.

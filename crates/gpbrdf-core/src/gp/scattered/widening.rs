@@ -22,12 +22,12 @@ const OCTAVES: usize = 7;
 ///
 /// A process takes its hyper-parameters as certain and its function as equally smooth everywhere. Where no sample is
 /// near, its intervals are therefore too narrow: the lobes of a material are steeper than what the kernel learns from
-/// all of its samples. So regions of all sizes are left out around some of the samples, each of these is predicted from
-/// the samples outside of its region, and a factor is the one with which 95 % intervals would have held 95 % of the
-/// samples that were predicted about as uncertainly. Leaving out single samples alone would say nothing about directions
-/// that are farther from all samples than these are from each other. Highlights have factors of their own. Source of the
-/// principle: D. R. Roberts et al., "Cross-validation strategies for data with temporal, spatial, hierarchical, or
-/// phylogenetic structure" (2017).
+/// all of its samples. So regions of all sizes are left out around some of the samples, each of these is predicted
+/// from the samples outside of its region, and a factor is the one with which 95 % intervals would have held 95 % of
+/// the samples that were predicted about as uncertainly. Leaving out single samples alone would say nothing about
+/// directions that are farther from all samples than these are from each other. Highlights have factors of their own.
+/// Source of the principle: D. R. Roberts et al., "Cross-validation strategies for data with temporal, spatial,
+/// hierarchical, or phylogenetic structure" (2017).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Widening {
     /// The first coordinate of the kernel at [`HIGHLIGHT`].
@@ -116,8 +116,9 @@ struct Predicted {
 
 #[cfg(feature = "fit")]
 impl Widening {
-    /// The factors for targets `y`, one column per channel, in coordinates of a space. Samples whose weights are below 1
-    /// are not predicted. Cost: up to 2,700 conditionals on 48 samples and as many times the distances to all of them.
+    /// The factors for targets `y`, one column per channel, in coordinates of a space. Samples whose weights are
+    /// below 1 are not predicted. Cost: up to 2,700 conditionals on 48 samples and as many times the distances to all
+    /// of them.
     ///
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
