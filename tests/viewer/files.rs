@@ -46,13 +46,13 @@ fn slices_models_and_sessions_are_written_and_read_again() {
 }
 
 #[test]
-fn the_sphere_is_written_and_curves_of_all_kinds_are_drawn() {
+fn the_picture_is_written_and_curves_of_all_kinds_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::new(&[PathBuf::from("lambert")]);
     driver.slide("Samples", 1500.0);
     driver.wait("the sphere", |d| d.viewer().is_settled());
     driver.click("File");
-    driver.click("Export sphere…");
+    driver.click("Export picture…");
     let path = folder.path().join("ball.png");
     driver.enter("Path", &path.display().to_string());
     driver.click("Write");

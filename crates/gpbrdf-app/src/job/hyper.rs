@@ -34,12 +34,49 @@ pub(crate) fn hyper_sliders(hyper: &Hyper) -> Vec<HyperSlider> {
     hyper.parameters().into_iter().map(|parameter| slider(parameter.kind, parameter.value)).collect()
 }
 
+/// The name for people of a hyper-parameter that a report names by its place: `terms[0].log_length_scale[2]` and
+/// `terms[0].axes[2].terms[0].log_length_scale` are the length scale φd here. A process that is named in front of it
+/// stays there.
+pub(crate) fn bound_name(name: &str) -> String {
+    let (process, place) =
+        name.rsplit_once(' ').map_or((None, name), |(process, place)| (Some(process), place));
+    let index = |part: &str, word: &str| {
+        part.strip_prefix(word)?.strip_prefix('[')?.strip_suffix(']')?.parse::<usize>().ok()
+    };
+    let mut parts: Vec<&str> = place.split('.').collect();
+    let last = parts.pop().unwrap_or_default();
+    let word = last.split('[').next().unwrap_or_default();
+    let axis = index(last, word).or_else(|| parts.iter().find_map(|part| index(part, "axes")));
+    let term = parts.first().and_then(|part| index(part, "terms")).filter(|&term| term > 0);
+    let mut text = match word.trim_start_matches("log_") {
+        "noise_ratio" => "ratio of noise to signal".to_owned(),
+        "alpha" => "mixture α".to_owned(),
+        other => other.replace('_', " "),
+    };
+    text.extend(axis.map(|axis| format!(" {}", AXES[axis.min(2)])));
+    text.extend(term.map(|term| format!(" of kernel {}", term + 1)));
+    process.map_or(text.clone(), |process| format!("{process} {text}"))
+}
+
 #[cfg(test)]
 mod tests {
     use gpbrdf_core::kernel::{AxisMetric, Kernel, Kernel1d};
     use gpbrdf_core::{Shape, Solver};
 
     use super::*;
+
+    #[test]
+    fn bounds_are_named_in_words() {
+        for (name, words) in [
+            ("noise_ratio", "ratio of noise to signal"),
+            ("terms[0].log_length_scale[2]", "length scale φd"),
+            ("terms[1].log_variance", "variance of kernel 2"),
+            ("terms[0].axes[1].terms[0].log_alpha", "mixture α θd"),
+            ("achromatic noise_ratio", "achromatic ratio of noise to signal"),
+        ] {
+            assert_eq!(bound_name(name), words);
+        }
+    }
 
     #[test]
     fn every_hyper_parameter_has_a_name_and_is_within_its_range() {

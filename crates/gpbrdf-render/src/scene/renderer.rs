@@ -254,7 +254,8 @@ impl Renderer {
     /// # Errors
     /// Those of [`Context::guard`].
     pub fn set_materials(&mut self, truth: Option<&BrdfTexture>, prediction: &BrdfTexture) -> Result<()> {
-        self.materials = Some(Materials::new(&self.context, truth, prediction, self.options.exact_lookup)?);
+        let exact = self.options.exact_lookup;
+        self.materials = Some(Materials::new(&self.context, &self.shader, truth, prediction, exact)?);
         self.restart();
         Ok(())
     }
@@ -269,7 +270,8 @@ impl Renderer {
             && let Some(materials) = &self.materials
         {
             let (truth, prediction) = materials.textures();
-            self.materials = Some(Materials::new(&self.context, truth, prediction, options.exact_lookup)?);
+            let exact = options.exact_lookup;
+            self.materials = Some(Materials::new(&self.context, &self.shader, truth, prediction, exact)?);
         }
         if options != self.options {
             self.options = options;

@@ -12,7 +12,7 @@ use gpbrdf_core::{Brdf, HalfDiff};
 use serde::{Deserialize, Serialize};
 
 use super::directions::PLANNED;
-use crate::viewer::state::document::Document;
+use crate::viewer::state::document::{Document, Work};
 use crate::viewer::state::look::{Channel, SliceLook};
 use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
 use crate::viewer::ui::pane::{
@@ -161,12 +161,10 @@ impl Pane for Slices {
         self.tools_ui(ui);
         let Some(document) = cx.documents.selected() else { return };
         let Some(shown) = self.shown.as_ref().filter(|s| s.key.document == document.id) else {
-            ui.centered_and_justified(|ui| {
-                ui.horizontal(|ui| {
-                    ui.spinner();
-                    ui.label("Fitting a model to the measurements");
-                })
-            });
+            if waiting_ui(ui, document) {
+                let id = document.id;
+                cx.documents.get_mut(id).into_iter().for_each(Document::retry);
+            }
             return;
         };
         let grid = Grid { look: &self.look, shown, document, reset: cx.reset_views };
@@ -254,6 +252,22 @@ impl Slices {
             });
         });
     }
+}
+
+/// What is going on while there are no slices; whether the model is to be fitted again.
+fn waiting_ui(ui: &mut Ui, document: &Document) -> bool {
+    let mut again = false;
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.3 * ui.available_height()).max(8.0));
+        if document.is_busy() || document.fitted.is_some() {
+            ui.spinner();
+        }
+        ui.label(document.work.text().unwrap_or_else(|| "Drawing slices".to_owned()));
+        if matches!(document.work, Work::Failed(_) | Work::Cancelled) {
+            again = ui.button("Fit it again").clicked();
+        }
+    });
+    again
 }
 
 /// What the pointer and the keys say about the views.

@@ -45,8 +45,7 @@ impl ThreeD {
             place_ui(ui, light);
         } else {
             degrees_ui(ui, "Turned", "The environment about the vertical axis", &mut light.yaw);
-            let help = "The environment about the horizontal axis, for the sphere only";
-            degrees_ui(ui, "Tilted", help, &mut light.pitch);
+            degrees_ui(ui, "Tilted", "The environment about the horizontal axis", &mut light.pitch);
         }
         ui.separator();
         if ui.button("Environment map…").clicked() {
@@ -73,13 +72,19 @@ fn narrow_ui(ui: &mut Ui, number: &Number<'_>, value: &mut f32) {
 }
 
 fn orbit_ui(ui: &mut Ui, orbit: &mut Orbit) {
-    let Orbit { azimuth, elevation, zoom } = Orbit::default();
-    let number = |label, range, default: f32, help| Number::new(label, range, f64::from(default), help);
-    let help = "Of the eye about an object, radians";
-    narrow_ui(ui, &number("Azimuth", -3.15..=3.15, azimuth, help), &mut orbit.azimuth);
-    let help = "Of the eye over an object, radians";
-    narrow_ui(ui, &number("Elevation", -1.5..=1.5, elevation, help), &mut orbit.elevation);
-    narrow_ui(ui, &number("Zoom", 0.3..=6.0, zoom, "How large it is"), &mut orbit.zoom);
+    let usual = Orbit::default();
+    let mut angle = |label, most: f64, usual: f32, help, radians: &mut f32| {
+        let mut number = Number::new(label, -most..=most, f64::from(usual.to_degrees()), help);
+        number.suffix = "°";
+        let mut shown = f64::from(radians.to_degrees());
+        if number.row_ui(ui, &mut shown) {
+            *radians = narrow(shown.to_radians());
+        }
+    };
+    angle("Azimuth", 180.0, usual.azimuth, "Of the eye about an object, degrees", &mut orbit.azimuth);
+    angle("Elevation", 85.0, usual.elevation, "Of the eye over an object, degrees", &mut orbit.elevation);
+    let help = "How large it is, as a factor";
+    narrow_ui(ui, &Number::new("Zoom", 0.3..=6.0, f64::from(usual.zoom), help), &mut orbit.zoom);
 }
 
 /// The place of the point light.
