@@ -209,7 +209,7 @@ fn a_lost_device_is_reported_and_opened_anew() {
     let context = Context::open(AdapterChoice::Any).unwrap();
     let theirs = context.clone();
     let mut driver = Driver::around(SIZE, move |ctx| {
-        let settings = "{\"view\": \"3d\", \"panes\": {\"3d\": {\"shape\": \"Knot\"}}}";
+        let settings = "{\"hint\": false, \"view\": \"3d\", \"panes\": {\"3d\": {\"shape\": \"Knot\"}}}";
         let settings = serde_json::from_str(settings).unwrap();
         let mut viewer = Viewer::new(ctx, settings, &[PathBuf::from("ward")]).unwrap();
         viewer.use_device(&theirs).unwrap();

@@ -50,7 +50,7 @@ const MEASURED: &str = "rough-copper.csv";
 const MANY: &str = "many.csv";
 const MISSING: [&str; 6] = ["a.bsdf", "b.bsdf", "c.binary", "d.csv", "e.json", "f.exr"];
 
-const SCENES: [Scene; 13] = [
+const SCENES: [Scene; 14] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
@@ -71,7 +71,13 @@ const SCENES: [Scene; 13] = [
     Scene { name: "viewer-directions", open: &[MEASURED], settings: r#"{"view": "directions"}"#, ..PLAIN },
     Scene { name: "viewer-large-text", size: [800.0, 500.0], scale: 2.0, ..PLAIN },
     // To look at while the viewer is changed; no document shows them.
-    Scene { name: "check-first-second", after: Some(Duration::from_secs(2)), ..PLAIN },
+    Scene {
+        name: "check-first-second",
+        settings: r#"{"hint": true}"#,
+        after: Some(Duration::from_secs(2)),
+        ..PLAIN
+    },
+    Scene { name: "check-data", open: &[MEASURED], settings: r#"{"view": "data"}"#, ..PLAIN },
     Scene { name: "check-glossy", open: &["silver-paint"], ..PLAIN },
     Scene {
         name: "check-five-materials",
@@ -136,7 +142,11 @@ fn opened(name: &str, folder: &Path) -> Result<PathBuf> {
 }
 
 fn photograph(scene: &Scene, file: &Path) -> Result {
-    let settings: Settings = serde_json::from_str(scene.settings)?;
+    let mut settings: serde_json::Value = serde_json::from_str(scene.settings)?;
+    if settings.get("hint").is_none() {
+        settings["hint"] = false.into();
+    }
+    let settings: Settings = serde_json::from_value(settings)?;
     let folder = tempfile::tempdir()?;
     let files: Result<Vec<PathBuf>> = scene.open.iter().map(|name| opened(name, folder.path())).collect();
     let files = files?;

@@ -23,12 +23,32 @@ use eframe::egui;
 pub use app::{FrameTimes, Viewer};
 pub use state::settings::Settings;
 
-/// See a measured material, its Gaussian-process prediction and the error, and change the model live.
+/// What `--help` says after the arguments.
+const HELP: &str = "\
+What to do first:
+  gpbrdf-viewer                        a built-in material, lit; everything can be tried on it
+  gpbrdf-viewer measured.csv           your measurements: the material that they make, and what to measure next
+  gpbrdf-viewer satin.bsdf ward        a file beside a built-in material (Materials in the menu has all names)
+  gpbrdf-viewer all.json               a session, as it was saved
+
+In the window: H shows all keys, Ctrl+O opens more, 1 to 6 choose a view, Escape cancels what is running.
+Angles are in degrees, BRDF values in 1/sr. Settings are kept from run to run. For work without a window there is
+gpbrdf-cli.";
+
+/// A window on measured materials: what a Gaussian process makes of few measurements, lit, with its error bar, beside
+/// the truth where that is known. The model can be changed while you look.
 #[derive(Debug, Parser)]
-#[command(name = "gpbrdf-viewer", version, about, max_term_width = 100)]
+#[command(
+    name = "gpbrdf-viewer",
+    version,
+    about = "A window on measured materials: what a Gaussian process makes of them, lit, with its error bar",
+    long_about,
+    after_help = HELP,
+    max_term_width = 120
+)]
 struct Arguments {
     /// Materials, models, sessions, environment maps and meshes to open, whichever each file holds, or names of
-    /// built-in materials.
+    /// built-in materials; without any, one built-in material.
     files: Vec<PathBuf>,
     /// Whether open files of measurements are read again when they change, so that a measurement that is added to one
     /// is fitted at once.

@@ -97,6 +97,8 @@ pub(crate) struct Document {
     pub(crate) spec: ModelSpec,
     /// The model that was last requested from the fitter.
     pub(crate) requested: Option<ModelSpec>,
+    /// The number of that request.
+    pub(crate) request: u64,
     pub(crate) fitted: Option<Fitted>,
     /// The hyper-parameters that the last search found: the defaults of the sliders.
     pub(crate) optimum: Option<Hyper>,
@@ -130,6 +132,7 @@ impl Document {
             truth: None,
             spec: ModelSpec::interactive(),
             requested: None,
+            request: 0,
             fitted: None,
             optimum: None,
             work: Work::Idle,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use eframe::egui::{ColorImage, Context};
+use eframe::egui::{ColorImage, Context, Rect};
 use gpbrdf_core::Rgb;
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, Slice, panel_figure, slice_figure};
@@ -122,6 +122,33 @@ fn picture_of(image: &ColorImage) -> Picture {
         let [r, g, b, _] = image.pixels[y * width + x].to_array();
         [r, g, b]
     })
+}
+
+/// Writes curves as a table, and a picture of this part of the window beside it.
+pub(crate) fn curves(ctx: &Context, text: String, part: Option<Rect>, path: &Path, outbox: &Outbox<Saved>) {
+    let path = path.with_extension("csv");
+    let table = move |path: &Path| -> Result<AtomicFile> {
+        let mut file = AtomicFile::create(path)?;
+        std::io::Write::write_all(&mut file, text.as_bytes())
+            .with_context(|| format!("cannot write \"{}\"", path.display()))?;
+        Ok(file)
+    };
+    let Some(part) = part else {
+        write(outbox, move || {
+            table(&path)?.commit()?;
+            Ok(format!("wrote \"{}\"", path.display()))
+        });
+        return;
+    };
+    let (outbox, scale) = (outbox.clone(), ctx.pixels_per_point());
+    ctx.request_screenshot(move |image| {
+        write(&outbox, move || {
+            let picture = picture_of(&image.region(&part, Some(scale)));
+            let files = vec![table(&path)?, png_file(&path.with_extension("png"), &picture)?];
+            AtomicFile::commit_all(files)?;
+            Ok(format!("wrote \"{}\" and its picture beside it", path.display()))
+        });
+    });
 }
 
 /// Writes the directions to measure next.

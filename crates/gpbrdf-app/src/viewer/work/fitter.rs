@@ -24,6 +24,8 @@ use crate::viewer::state::document::{Document, DocumentId, Fitted, Work};
 #[derive(Debug)]
 pub(crate) struct Report {
     pub(crate) document: DocumentId,
+    /// The number of the request.
+    pub(crate) request: u64,
     pub(crate) news: News,
 }
 
@@ -98,6 +100,8 @@ impl News {
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
     pub(crate) document: DocumentId,
+    /// A number that no earlier request had. What older requests still report is for nobody.
+    pub(crate) number: u64,
     pub(crate) source: Arc<Source>,
     pub(crate) truth: Option<Arc<BrdfTable>>,
     pub(crate) spec: ModelSpec,
@@ -284,7 +288,8 @@ fn serve(lane: &Lane, kept: &Kept, outbox: &Outbox<Report>, pool: Option<&rayon:
                 queue = lane.wake.wait(queue).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        let document = request.document;
+        let (document, number) = (request.document, request.number);
+        let report = |news| outbox.send(Report { document, request: number, news });
         let follower = Follower::new(&request, cancel, Arc::clone(kept), outbox.clone());
         let result = match pool {
             Some(pool) => pool.install(|| run(&request, follower)),
@@ -293,14 +298,14 @@ fn serve(lane: &Lane, kept: &Kept, outbox: &Outbox<Report>, pool: Option<&rayon:
         let mut queue = lane.lock();
         let requeue = queue.running.take().is_some_and(|r| r.requeue);
         match result {
-            Ok(()) => outbox.send(Report { document, news: News::Done }),
+            Ok(()) => report(News::Done),
             Err(error) if is_cancelled(&error) => {
                 if requeue && !queue.requests.iter().any(|r| r.document == document) {
-                    outbox.send(Report { document, news: News::Interrupted });
+                    report(News::Interrupted);
                     queue.requests.insert(0, request);
                 }
             }
-            Err(error) => outbox.send(Report { document, news: News::Failed(format!("{error:#}")) }),
+            Err(error) => report(News::Failed(format!("{error:#}"))),
         }
     }
 }
@@ -328,6 +333,7 @@ fn run(request: &Request, follower: Follower) -> Result<()> {
 /// Reports the stages and results of one request.
 struct Follower {
     document: DocumentId,
+    request: u64,
     version: u64,
     cancel: Arc<AtomicBool>,
     kept: Kept,
@@ -343,11 +349,12 @@ const SHARE: f64 = 0.005;
 impl Follower {
     fn new(request: &Request, cancel: Arc<AtomicBool>, kept: Kept, outbox: Outbox<Report>) -> Self {
         let version = VERSION.fetch_add(1, Ordering::Relaxed);
-        Self { document: request.document, version, cancel, kept, outbox, told: Mutex::default() }
+        let (document, request) = (request.document, request.number);
+        Self { document, request, version, cancel, kept, outbox, told: Mutex::default() }
     }
 
     fn tell(&self, news: News) {
-        self.outbox.send(Report { document: self.document, news });
+        self.outbox.send(Report { document: self.document, request: self.request, news });
     }
 
     /// The samples that an earlier request has left.
@@ -422,7 +429,7 @@ mod tests {
             source.content = Content::Samples(Box::new(samples));
         }
         let spec = ModelSpec { lattice: Some([8, 6, 4]), ..ModelSpec::interactive() };
-        Request { document: DocumentId(id), source: Arc::new(source), truth: None, spec }
+        Request { document: DocumentId(id), number: id, source: Arc::new(source), truth: None, spec }
     }
 
     #[test]

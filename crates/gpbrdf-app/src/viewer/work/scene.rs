@@ -167,6 +167,9 @@ pub(crate) struct Whole {
     pub(crate) linear: Arc<LinearPicture>,
 }
 
+/// The most pixels of a picture where the processor does the device's work; the window enlarges it.
+const SOFTWARE_PIXELS: f64 = 320_000.0;
+
 /// Samples of a smooth picture.
 const SAMPLES: u32 = 192;
 /// Samples of a picture that replaces the small one.
@@ -278,6 +281,17 @@ impl Scene {
         Ok((context, renderer))
     }
 
+    /// Columns and rows of the picture of a request.
+    fn size_of(&self, key: &SceneKey) -> [u32; 2] {
+        let pixels: f64 = key.size.map(f64::from).iter().product();
+        if pixels <= SOFTWARE_PIXELS || self.context.as_ref().is_none_or(Context::is_hardware) {
+            return key.size;
+        }
+        let factor = (SOFTWARE_PIXELS / pixels).sqrt();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "smaller than it was")]
+        key.size.map(|side| (f64::from(side) * factor).max(16.0) as u32)
+    }
+
     /// Takes a picture of a few pixels, for which drivers compile all shaders.
     fn warm_up(&mut self) -> Result<(), Stop> {
         let (context, renderer) = self.renderer([16, 16])?;
@@ -298,9 +312,10 @@ impl Scene {
     ) -> Result<(), Stop> {
         let key = &request.key;
         self.prepare(request)?;
+        let size = self.size_of(key);
         let Some(renderer) = &mut self.renderer else { return Ok(()) };
         if renderer.samples() == 0 {
-            renderer.resize(key.size.map(|side| (side / SMALL).max(16)))?;
+            renderer.resize(size.map(|side| (side / SMALL).max(16)))?;
             renderer.render_more(SMALL_SAMPLES)?;
             let linear = renderer.read_linear()?;
             let known = self.exposure.take().filter(|(last, _)| last.has_exposure_of(key));
@@ -316,7 +331,7 @@ impl Scene {
         let mut step = 1;
         loop {
             let Some(renderer) = &mut self.renderer else { return Ok(()) };
-            renderer.resize(key.size)?;
+            renderer.resize(size)?;
             renderer.render_more(step.min(SAMPLES.saturating_sub(renderer.samples())))?;
             let samples = renderer.samples();
             if samples >= FIRST_SAMPLES {
@@ -409,6 +424,7 @@ impl Scene {
         let key = &request.key;
         let (context, _) = self.renderer(key.size)?;
         self.set_materials(&context, request)?;
+        let size = self.size_of(key);
         let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
@@ -427,7 +443,7 @@ impl Scene {
             renderer.set_light(light(&context, key, &request.environment)?)?;
         }
         // A small picture that was interrupted says nothing of the whole one.
-        if renderer.size() != key.size {
+        if renderer.size() != size {
             renderer.restart();
         }
         if renderer.samples() == 0 {
