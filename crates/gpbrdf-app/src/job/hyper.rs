@@ -10,6 +10,8 @@ pub(crate) struct HyperSlider {
     pub(crate) value: f64,
     /// The values that it may have.
     pub(crate) range: (f64, f64),
+    /// What it is, with its unit.
+    pub(crate) help: &'static str,
 }
 
 const AXES: [&str; 3] = ["θh", "θd", "φd"];
@@ -21,15 +23,31 @@ const ALPHAS: (f64, f64) = (0.05, 1e3);
 /// The sliders of all hyper-parameters, in the order of [`Hyper::parameters`].
 pub(crate) fn hyper_sliders(hyper: &Hyper) -> Vec<HyperSlider> {
     let slider = |kind, value| {
-        let (name, range) = match kind {
-            HyperKind::LengthScale(axis) => (format!("Length scale {}", AXES[axis.min(2)]), LENGTHS),
-            HyperKind::Alpha(Some(axis)) => (format!("Mixture α {}", AXES[axis.min(2)]), ALPHAS),
-            HyperKind::Alpha(None) => ("Mixture α".to_owned(), ALPHAS),
-            HyperKind::Weight => ("Weight".to_owned(), VARIANCES),
-            HyperKind::SignalVariance => ("Signal variance".to_owned(), VARIANCES),
-            HyperKind::NoiseVariance => ("Noise variance".to_owned(), NOISES),
+        let (name, range, help) = match kind {
+            HyperKind::LengthScale(axis) => {
+                let help =
+                    "The distance over which values resemble each other, in units of the kernel's coordinate";
+                (format!("Length scale {}", AXES[axis.min(2)]), LENGTHS, help)
+            }
+            HyperKind::Alpha(Some(axis)) => (
+                format!("Mixture α {}", AXES[axis.min(2)]),
+                ALPHAS,
+                "The mixture of length scales, without a unit",
+            ),
+            HyperKind::Alpha(None) => {
+                ("Mixture α".to_owned(), ALPHAS, "The mixture of length scales, without a unit")
+            }
+            HyperKind::Weight => ("Weight".to_owned(), VARIANCES, "The share of a kernel, without a unit"),
+            HyperKind::SignalVariance => {
+                let help = "How much the target varies about its mean, in squared units of the target";
+                ("Signal variance".to_owned(), VARIANCES, help)
+            }
+            HyperKind::NoiseVariance => {
+                let help = "The variance of the error of a measurement, in squared units of the target";
+                ("Noise variance".to_owned(), NOISES, help)
+            }
         };
-        HyperSlider { name, value, range }
+        HyperSlider { name, value, range, help }
     };
     hyper.parameters().into_iter().map(|parameter| slider(parameter.kind, parameter.value)).collect()
 }
@@ -97,8 +115,8 @@ mod tests {
                 "Noise variance"
             ]
         );
-        for HyperSlider { name, value, range } in sliders {
-            assert!(range.0 < value && value < range.1, "{name}");
+        for HyperSlider { name, value, range, help } in sliders {
+            assert!(range.0 < value && value < range.1 && help.contains("unit"), "{name}");
         }
     }
 }

@@ -6,8 +6,9 @@ use gpbrdf_core::judge::Image;
 
 use super::camera::Camera;
 use super::colour::luminance;
-use super::display::{Display, DisplayTexture, Displayer, Shown};
+use super::display::{Display, DisplayTexture, Displayer, GroundBuffer, Shown};
 use super::gbuffer::{GBuffer, Geometry, MeshBuffers, Rasterizer, view_of};
+use super::ground::Ground;
 use super::light::Light;
 use super::shade::{EnvironmentBuffers, Job, Materials, Shader, ShadingOptions};
 use crate::context::Context;
@@ -53,6 +54,7 @@ pub struct Renderer {
     light: Light,
     environment: EnvironmentBuffers,
     black: EnvironmentBuffers,
+    ground: Option<GroundBuffer>,
     materials: Option<Materials>,
     options: ShadingOptions,
     view: wgpu::Buffer,
@@ -145,6 +147,7 @@ impl Renderer {
             camera: Camera::default(),
             environment: EnvironmentBuffers::new(context, &light)?,
             black: EnvironmentBuffers::new(context, &light)?,
+            ground: None,
             light,
             materials: None,
             options: ShadingOptions::default(),
@@ -245,6 +248,16 @@ impl Renderer {
         }
         self.light = light;
         self.restart();
+        Ok(())
+    }
+
+    /// Changes the ground that is seen behind the object, under an environment and with a perspective camera. It is
+    /// part of the background, so samples are kept.
+    ///
+    /// # Errors
+    /// Those of [`Context::guard`].
+    pub fn set_ground(&mut self, ground: Option<&Ground>) -> Result<()> {
+        self.ground = ground.map(|ground| GroundBuffer::new(&self.context, ground)).transpose()?;
         Ok(())
     }
 
@@ -361,6 +374,7 @@ impl Renderer {
             view: view_of(&self.camera, self.size(), [0.0; 2]),
             map: if has_map { &self.environment } else { &self.black },
             has_map,
+            ground: self.ground.as_ref(),
         };
         self.displayer.draw(&self.context, display, &shown, &self.frame.display)?;
         Ok(&self.frame.display.view)

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use eframe::egui::{self, Align2, Area, Context, Frame, Id, Label, Layout, Order, RichText, Ui, vec2};
+use eframe::egui::{self, Align2, Area, Context, Frame, Id, Label, Order, RichText, Ui, vec2};
 
 use super::theme;
 use crate::viewer::state::messages::{Kind, Message, Messages};
@@ -11,6 +11,8 @@ use crate::viewer::state::messages::{Kind, Message, Messages};
 const SHARE: f32 = 0.45;
 /// The width of a message where there is room for it.
 const WIDTH: f32 = 460.0;
+/// Room for what is beside the text of a message.
+const BESIDE: f32 = 150.0;
 /// From the right and the lower edge of the window, above the status line.
 const MARGIN: egui::Vec2 = vec2(-12.0, -36.0);
 /// Seconds for which a success is shown.
@@ -35,13 +37,14 @@ pub(crate) fn messages_ui(ctx: &Context, messages: &mut Messages) {
     area.show(ctx, |ui| {
         ui.set_width(width);
         if messages.iter().count() > 2 {
-            ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
+            ui.horizontal(|ui| {
+                ui.add_space((width - 86.0).max(0.0));
                 all = ui.button("Dismiss all").clicked();
             });
         }
         egui::ScrollArea::vertical().max_height(SHARE * room.y).auto_shrink([false, true]).show(ui, |ui| {
             for (i, message) in messages.iter().enumerate() {
-                if message_ui(ui, message) {
+                if message_ui(ui, message, width) {
                     read = Some(i);
                 }
             }
@@ -54,8 +57,8 @@ pub(crate) fn messages_ui(ctx: &Context, messages: &mut Messages) {
     }
 }
 
-/// One message; whether it is dismissed.
-fn message_ui(ui: &mut Ui, message: &Message) -> bool {
+/// One message of a width; whether it is dismissed.
+fn message_ui(ui: &mut Ui, message: &Message, width: f32) -> bool {
     let (colour, mark) = match message.kind {
         Kind::Error => (theme::ERROR, "Error"),
         Kind::Note => (theme::NOTE, "Note"),
@@ -67,12 +70,11 @@ fn message_ui(ui: &mut Ui, message: &Message) -> bool {
     frame.show(ui, |ui| {
         ui.horizontal_top(|ui| {
             ui.label(RichText::new(mark).strong().color(white));
-            ui.with_layout(Layout::right_to_left(egui::Align::Min), |ui| {
-                dismissed = ui.button("Dismiss").clicked();
-                ui.with_layout(Layout::left_to_right(egui::Align::Min), |ui| {
-                    ui.add(Label::new(RichText::new(&message.text).color(white)).wrap());
-                });
+            ui.vertical(|ui| {
+                ui.set_width((width - BESIDE).max(80.0));
+                ui.add(Label::new(RichText::new(&message.text).color(white)).wrap());
             });
+            dismissed = ui.button("Dismiss").clicked();
         });
     });
     dismissed

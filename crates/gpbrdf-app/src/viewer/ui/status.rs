@@ -14,8 +14,8 @@ pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
     ui.horizontal_wrapped(|ui| {
         if let Some(document) = documents.selected() {
             ui.label(RichText::new(&document.name).strong());
-            ui.separator();
             if let Some(fitted) = &document.fitted {
+                ui.separator();
                 fit_ui(ui, fitted);
             }
             if let Some(text) = document.work.text() {
@@ -54,7 +54,8 @@ fn others_ui(ui: &mut Ui, documents: &Documents) {
 fn fit_ui(ui: &mut Ui, fitted: &Fitted) {
     let n = fitted.model.n_samples();
     let share = 100.0 * n as f64 / gpbrdf_core::brdf::N_CELLS as f64;
-    ui.label(format!("{n} samples ({} % of a table)", short((100.0 * share).round() / 100.0)));
+    let share = gpbrdf_core::base::number::short(share, 3);
+    ui.label(format!("{n} samples ({share} % of a table)"));
     ui.separator();
     let total = 1e3 * fitted.seconds.iter().sum::<f64>();
     ui.label(format!("refitted and baked in {total:.0} ms"));

@@ -14,8 +14,8 @@ use gpbrdf_core::base::Raster;
 use gpbrdf_core::figure::round_limit;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
-    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
-    LinearPicture, LinearPixel, Mesh, Precision, Renderer, Show, ToneCurve, read_mesh,
+    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Ground,
+    Light, LinearPicture, LinearPixel, Mesh, Precision, Renderer, Show, ToneCurve, read_mesh,
 };
 use rayon::prelude::*;
 
@@ -69,12 +69,15 @@ impl SceneKey {
         to_f32(self.light.exposure.exp2())
     }
 
-    /// The camera. The sphere looks the same from everywhere; its eye stays before the light.
+    /// The camera. The sphere looks the same from everywhere; its eye stays before the light, a little above the
+    /// ground.
     fn camera(&self) -> Camera {
-        let camera = Camera::perspective(0.6, 0.94);
-        let orbit = self.orbit;
-        let camera =
-            if self.shape == Shape::Sphere { camera } else { camera.orbited(orbit.azimuth, orbit.elevation) };
+        let (orbit, camera) = (self.orbit, Camera::perspective(0.6, 0.82));
+        let camera = if self.shape == Shape::Sphere {
+            camera.orbited(0.0, SPHERE_ELEVATION)
+        } else {
+            camera.orbited(orbit.azimuth, orbit.elevation)
+        };
         camera.zoomed(orbit.zoom)
     }
 
@@ -170,6 +173,13 @@ pub(crate) struct Whole {
 /// The most pixels of a picture where the processor does the device's work; the window enlarges it.
 const SOFTWARE_PIXELS: f64 = 320_000.0;
 
+/// How high the eye is that sees the sphere, radians.
+const SPHERE_ELEVATION: f32 = 0.2;
+
+/// Directions of the light on the ground: in the small picture, and in the whole one.
+const GROUND_AT_FIRST: usize = 48;
+const GROUND_DIRECTIONS: usize = 320;
+
 /// Samples of a smooth picture.
 const SAMPLES: u32 = 192;
 /// Samples of a picture that replaces the small one.
@@ -205,6 +215,9 @@ pub(crate) fn spawn(
         renderer: None,
         materials: None,
         last: None,
+        geometry: Geometry::Sphere,
+        turned: None,
+        ground: 0,
         picture: 0,
         exposure: None,
         limits: Limits::default(),
@@ -239,6 +252,11 @@ struct Scene {
     renderer: Option<Renderer>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
+    geometry: Geometry,
+    /// The environment as it is turned; `None` under a point light.
+    turned: Option<Environment>,
+    /// Directions of the ground's light.
+    ground: usize,
     picture: u64,
     /// The exposure that was found for a scene, which it keeps while the eye moves.
     exposure: Option<(SceneKey, f32)>,
@@ -319,8 +337,11 @@ impl Scene {
             renderer.render_more(SMALL_SAMPLES)?;
             let linear = renderer.read_linear()?;
             let known = self.exposure.take().filter(|(last, _)| last.has_exposure_of(key));
-            let exposure =
-                known.map_or_else(|| automatic_exposure(linear.raster().pixels()), |(_, exposure)| exposure);
+            let found = || {
+                let most = self.turned.as_ref().map_or(f32::INFINITY, most_exposure);
+                automatic_exposure(linear.raster().pixels()).min(most)
+            };
+            let exposure = known.map_or_else(found, |(_, exposure)| exposure);
             self.exposure = Some((key.clone(), exposure));
             self.limits = limits(&linear, exposure * key.stops());
             outbox.send(SceneResult::Picture(Box::new(self.image(request, None)?)));
@@ -335,6 +356,10 @@ impl Scene {
             renderer.render_more(step.min(SAMPLES.saturating_sub(renderer.samples())))?;
             let samples = renderer.samples();
             if samples >= FIRST_SAMPLES {
+                if let Some(map) = self.turned.as_ref().filter(|_| self.ground == GROUND_AT_FIRST) {
+                    self.ground = GROUND_DIRECTIONS;
+                    renderer.set_ground(Some(&Ground::new(&self.geometry, map, self.ground)))?;
+                }
                 outbox.send(SceneResult::Picture(Box::new(self.image(request, Some(samples))?)));
                 self.measure(request, samples, outbox)?;
             } else {
@@ -429,7 +454,8 @@ impl Scene {
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
         if changed(&|l| l.shape == key.shape) {
-            renderer.set_geometry(&key.shape.geometry().map_err(Stop::Error)?)?;
+            self.geometry = key.shape.geometry().map_err(Stop::Error)?;
+            renderer.set_geometry(&self.geometry)?;
         }
         if changed(&|l| l.size == key.size) {
             renderer.restart();
@@ -440,7 +466,14 @@ impl Scene {
         // A point light moves with the eye.
         let same_light = |l: &SceneKey| l.light.is_like(&key.light) && l.environment == key.environment;
         if changed(&|l| same_light(l) && (!key.light.point || l.camera() == key.camera())) {
-            renderer.set_light(light(&context, key, &request.environment)?)?;
+            let turned = turned(&request.environment, key.light.yaw, key.light.pitch);
+            renderer.set_light(light(&context, key, &turned)?)?;
+            self.turned = (!key.light.point).then_some(turned);
+        }
+        if changed(&|l| same_light(l) && l.shape == key.shape) {
+            self.ground = GROUND_AT_FIRST;
+            let ground = self.turned.as_ref().map(|map| Ground::new(&self.geometry, map, self.ground));
+            renderer.set_ground(ground.as_ref())?;
         }
         // A small picture that was interrupted says nothing of the whole one.
         if renderer.size() != size {
@@ -489,7 +522,8 @@ fn largest_channel(table: &BrdfTable) -> Vec<f32> {
     table.values().iter().map(|cell| cell.iter().copied().fold(0.0, f32::max)).collect()
 }
 
-/// The light of a request. A point light keeps its place over the picture while the eye orbits.
+/// The light of a request, from an environment that has been turned. A point light keeps its place over the picture
+/// while the eye orbits.
 fn light(context: &Context, key: &SceneKey, environment: &Environment) -> gpbrdf_render::Result<Light> {
     if key.light.point {
         let [x, y] = key.light.at.map(to_f32);
@@ -499,8 +533,7 @@ fn light(context: &Context, key: &SceneKey, environment: &Environment) -> gpbrdf
             irradiance: [std::f32::consts::PI; 3],
         });
     }
-    let turned = turned(environment, key.light.yaw, key.light.pitch);
-    Ok(Light::Environment(EnvironmentLight::for_device(context, &turned)?))
+    Ok(Light::Environment(EnvironmentLight::for_device(context, environment)?))
 }
 
 /// The environment turned by `yaw` about the vertical axis, which takes the light before the object to its right, and
@@ -557,6 +590,17 @@ fn automatic_exposure(pixels: &[LinearPixel]) -> f32 {
     let [usual, bright] = [last * 9 / 10, last * 499 / 500].map(|at| brightest[at]);
     let exposure = (0.6 / usual).min(6.0 / bright);
     if exposure.is_normal() { exposure } else { 1.0 }
+}
+
+/// The factor at which a quarter of the directions of an environment are brighter than 1.2, which the tone curve shows
+/// as a light grey: what is behind an object is not burnt out either.
+fn most_exposure(environment: &Environment) -> f32 {
+    let pixels = environment.raster().pixels().iter();
+    let mut brightest: Vec<f32> = pixels.map(|pixel| pixel.iter().copied().fold(0.0, f32::max)).collect();
+    let at = brightest.len() * 3 / 4;
+    let (_, level, _) = brightest.select_nth_unstable_by(at, f32::total_cmp);
+    let exposure = 1.2 / *level;
+    if exposure.is_normal() { exposure } else { f32::INFINITY }
 }
 
 /// Whether an object covers the whole pixel.

@@ -152,8 +152,8 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
     }
 }
 
-/// Whether each pixel of a slice counts for the ends of scales: those of the image metrics do, where both cosines are at
-/// least [`GRAZING_COSINE`]. A row of cells beyond them would make all others look alike.
+/// Whether each pixel of a slice counts for the ends of scales: those of the image metrics do, where both cosines are
+/// at least [`GRAZING_COSINE`]. A row of cells beyond them would make all others look alike.
 fn counted(options: &SliceOptions) -> Vec<bool> {
     let size = options.size;
     let share = |i: usize| (i as f64 + 0.5) / size as f64;

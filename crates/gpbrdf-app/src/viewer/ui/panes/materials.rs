@@ -81,7 +81,7 @@ fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<Doc
                 ui.add(field).accessible_name("Name").on_hover_text("Type to rename");
             } else {
                 let button = egui::Button::new(&name).frame(false).truncate();
-                let layout = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true);
+                let layout = egui::Layout::left_to_right(egui::Align::Center);
                 let size = egui::vec2(width, ui.spacing().interact_size.y);
                 let shown = ui.allocate_ui_with_layout(size, layout, |ui| ui.add(button));
                 if shown.inner.clicked() {

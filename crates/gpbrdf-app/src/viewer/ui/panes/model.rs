@@ -239,8 +239,8 @@ fn hyper_ui(ui: &mut Ui, document: &mut Document) {
     for (index, parameter) in hyper_sliders(&hyper).into_iter().enumerate() {
         let default = defaults.get(index).map_or(parameter.value, |d| d.value);
         let (low, high) = parameter.range;
-        let help = "Set by hand; the search found the default";
-        let mut number = Number::new(&parameter.name, low..=high, default, help);
+        let help = format!("{}\nSet by hand; the search found the default", parameter.help);
+        let mut number = Number::new(&parameter.name, low..=high, default, &help);
         number.logarithmic = true;
         let mut value = parameter.value;
         if number.row_ui(ui, &mut value) {

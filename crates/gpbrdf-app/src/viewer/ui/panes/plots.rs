@@ -151,7 +151,7 @@ impl Pane for Plots {
         let look = self.look;
         let beside = ui.available_width() > ROOMY;
         if !beside {
-            ui.horizontal_wrapped(|ui| legend_ui(ui, &drawn, &look));
+            ui.horizontal_wrapped(|ui| legend_ui(ui, &drawn, &look, false));
         }
         let mut size = ui.available_size();
         if beside {
@@ -174,7 +174,7 @@ impl Pane for Plots {
         if beside {
             let room = area.with_min_x(area.left() + size.x + 10.0);
             ui.scope_builder(UiBuilder::new().max_rect(room).id_salt("legend"), |ui| {
-                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| legend_ui(ui, &drawn, &look));
+                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| legend_ui(ui, &drawn, &look, true));
             });
         }
         self.shown = Some(area);
@@ -224,7 +224,8 @@ impl Plots {
         let look = &mut self.look;
         ui.horizontal_wrapped(|ui| {
             let slider = |ui: &mut Ui, name: &str, high: f64, default: f64, value: &mut f64| {
-                let mut number = Number::new(name, 0.0..=high, default, "Where the curve cuts the BRDF");
+                let mut number =
+                    Number::new(name, 0.0..=high, default, "Where the curve cuts the BRDF, degrees");
                 number.suffix = "°";
                 tool_ui(ui, number, if name.len() > 8 { 260.0 } else { 200.0 }, value);
             };
@@ -382,15 +383,23 @@ fn read(look: &CurveLook, [x, y]: [f64; 2]) -> (f64, f64) {
 const LEGEND: f32 = 150.0;
 const ROOMY: f32 = 480.0;
 
-/// What the lines are: the materials in the order of their list, then what each kind of line means.
-fn legend_ui(ui: &mut Ui, drawn: &[Drawn], look: &CurveLook) {
+/// What the lines are: the materials in the order of their list, then what each kind of line means; below each other
+/// where the legend is beside the plot, else in rows.
+fn legend_ui(ui: &mut Ui, drawn: &[Drawn], look: &CurveLook, beside: bool) {
     let entry = |ui: &mut Ui, text: &str, paint: &dyn Fn(&egui::Painter, Rect)| {
-        ui.horizontal(|ui| {
+        let parts = |ui: &mut Ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             let (rect, _) = ui.allocate_exact_size(egui::vec2(24.0, 12.0), egui::Sense::hover());
             paint(ui.painter(), rect);
-            ui.add(egui::Label::new(text).truncate()).on_hover_text(text);
-        });
+            let label = egui::Label::new(text);
+            let label = if beside { label.truncate() } else { label.extend() };
+            ui.add(label).on_hover_text(text);
+        };
+        if beside {
+            ui.horizontal(parts);
+        } else {
+            parts(ui);
+        }
     };
     for one in drawn {
         entry(ui, &one.name, &|painter, rect| {

@@ -217,12 +217,17 @@ impl Slices {
     fn tools_ui(&mut self, ui: &mut Ui) {
         let Look { slices: look, samples, plan, regions } = &mut self.look;
         let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
-        let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
+        let gamma = Number::new(
+            "Gamma",
+            1.0..=4.0,
+            2.2,
+            "Values are shown to the power of one over this, which has no unit",
+        );
         let wide = ui.available_width() > WIDE;
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Slices").strong().size(15.0));
             ui.add_space(6.0);
-            let help = "Azimuth of the light about the half vector";
+            let help = "Azimuth of the light about the half vector, degrees";
             let mut number = Number::new("φd", 0.0..=180.0, 90.0, help);
             number.suffix = "°";
             tool_ui(ui, number, 220.0, &mut look.phi_d);

@@ -13,8 +13,6 @@ use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
 use crate::viewer::ui::widgets::{narrow, scale_ui, short, subscripted};
 use crate::viewer::work::slices::colour;
 
-/// Measurements whose light is within so many degrees of the one that is chosen are shown.
-const NEAR: f64 = 4.0;
 /// The most measurements that are drawn.
 const MOST: usize = 6000;
 /// Steps of colour and of size.
@@ -62,7 +60,7 @@ fn measurements(fitted: &Fitted, look: &Look) -> Vec<Measured> {
     let all = samples.angles.iter().zip(&samples.values).enumerate();
     let found = all.filter_map(|(i, (angles, value))| {
         let [first, second, phi] = angles_of(angles);
-        let near = |theta: f64| (theta - look.incidence).abs() <= NEAR;
+        let near = |theta: f64| (theta - look.incidence).abs() <= look.within;
         let (theta_i, theta_o) = match (near(first), near(second)) {
             (true, _) => (first, second),
             (false, true) => (second, first),
@@ -81,7 +79,11 @@ pub(super) fn ui(ui: &mut Ui, document: &Document, fitted: &Fitted, look: &Look,
     let logs: Vec<f64> = measured.iter().map(|m| m.value.max(1e-6).log10()).collect();
     let (low, high) =
         logs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-    let title = format!("{} measurements with the light within {NEAR}°", measured.len());
+    let count = match measured.len() {
+        1 => "1 measurement".to_owned(),
+        n => format!("{n} measurements"),
+    };
+    let title = format!("{count} with the light within {:.0}° of {:.0}°", look.within, look.incidence);
     ui.label(RichText::new(title).strong());
     ui.horizontal(|ui| {
         if measured.is_empty() {

@@ -17,6 +17,8 @@ use crate::viewer::ui::widgets::{Number, segments_ui, tool_ui};
 struct Look {
     /// The angle between light and normal, degrees.
     incidence: f64,
+    /// How far from it the light of the measurements that are shown may be, degrees.
+    within: f64,
     channel: Channel,
     /// Whether the lobe is that of the truth.
     truth: bool,
@@ -27,7 +29,14 @@ struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Self { incidence: 45.0, channel: Channel::Rgb, truth: false, azimuth: -0.5, elevation: 0.35 }
+        Self {
+            incidence: 45.0,
+            within: 8.0,
+            channel: Channel::Rgb,
+            truth: false,
+            azimuth: -0.5,
+            elevation: 0.35,
+        }
     }
 }
 
@@ -95,6 +104,10 @@ impl Data {
             let mut number = Number::new("Light θi", 0.0..=85.0, 45.0, help);
             (number.suffix, number.whole) = ("°", true);
             tool_ui(ui, number, 240.0, &mut look.incidence);
+            let help = "How far from it the light of the measurements that are shown may be, degrees";
+            let mut number = Number::new("Within", 1.0..=90.0, 8.0, help);
+            (number.suffix, number.whole) = ("°", true);
+            tool_ui(ui, number, 200.0, &mut look.within);
             let names = |c| if c == Channel::Rgb { "Mean" } else { Channel::name(c) };
             segments_ui(ui, &mut look.channel, &Channel::ALL, names);
             ui.separator();

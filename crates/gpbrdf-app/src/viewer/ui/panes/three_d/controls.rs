@@ -38,8 +38,9 @@ impl ThreeD {
         let light = &mut self.look.light;
         ui.radio_value(&mut light.point, false, format!("Environment: {}", self.map.name));
         ui.radio_value(&mut light.point, true, "Point light");
-        Number::new("Exposure", -8.0..=8.0, 0.0, "Stops").row_ui(ui, &mut light.exposure);
-        let help = "Where truth ends and prediction begins";
+        Number::new("Exposure", -8.0..=8.0, 0.0, "Stops above or below the automatic exposure")
+            .row_ui(ui, &mut light.exposure);
+        let help = "Where truth ends and prediction begins, as a share of the width";
         narrow_ui(ui, &Number::new("Swipe", 0.0..=1.0, 0.5, help), &mut self.look.swipe);
         if light.point {
             place_ui(ui, light);
@@ -93,7 +94,12 @@ fn place_ui(ui: &mut Ui, light: &mut SphereLight) {
     let mut at = light.at;
     let mut changed = false;
     for (k, name) in ["Light x", "Light y"].into_iter().enumerate() {
-        let number = Number::new(name, -1.0..=1.0, fallback[k], "Where the light is over the disc");
+        let number = Number::new(
+            name,
+            -1.0..=1.0,
+            fallback[k],
+            "Where the light is over the disc, in units of its radius",
+        );
         changed |= number.row_ui(ui, &mut at[k]);
     }
     if changed {

@@ -220,7 +220,7 @@ impl ObjectView {
 fn quality_ui(ui: &mut Ui, quality: Option<Quality>, shown: &Shown) {
     let count = |n: u32| if n == 1 { "1 sample".to_owned() } else { format!("{n} samples") };
     if let Some(quality) = quality {
-        ui.label(RichText::new(psnr_text(quality.psnr)).strong());
+        ui.label(RichText::new(psnr_text(quality.psnr)).strong().color(Color32::WHITE));
         ui.label(format!("SSIM {:.4} at {}", quality.ssim, count(quality.samples)));
     }
     match shown.samples {
