@@ -48,10 +48,11 @@ fn slices_models_and_sessions_are_written_and_read_again() {
 #[test]
 fn the_picture_is_written_and_curves_of_all_kinds_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let mut driver = Driver::new(&[PathBuf::from("lambert")]);
+    let mut driver = Driver::set(&[PathBuf::from("lambert")], [720.0, 480.0], "{\"view\": \"3d\"}");
     driver.slide("Samples", 1500.0);
-    driver.wait("the sphere", |d| d.viewer().is_settled());
+    driver.wait("a picture", |d| d.after("SSIM ").is_some());
     driver.click("File");
+    // It is written once the picture is smooth.
     driver.click("Export picture…");
     let path = folder.path().join("ball.png");
     driver.enter("Path", &path.display().to_string());
@@ -60,6 +61,7 @@ fn the_picture_is_written_and_curves_of_all_kinds_are_drawn() {
     for name in ["ball-truth.exr", "ball-prediction.exr"] {
         assert!(exists(&folder.path().join(name)), "{name}");
     }
+    driver.press(Key::Num3);
     for name in ["Over θh", "Over θd", "Over φd", "Albedo"] {
         driver.harness.get_by_label(name).click();
         driver.harness.run_steps(4);

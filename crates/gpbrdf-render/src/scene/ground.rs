@@ -9,11 +9,11 @@ use super::gbuffer::Geometry;
 use super::mesh::Mesh;
 
 /// Texels along each side of the ground.
-const TEXELS: usize = 160;
+const TEXELS: usize = 224;
 /// Half of a side, in radii of the unit sphere.
-const HALF: f32 = 4.0;
+const HALF: f32 = 7.0;
 /// The share of the light that the ground reflects.
-const ALBEDO: f32 = 0.25;
+const ALBEDO: f32 = 0.17;
 /// Columns and rows of patches to which the environment is averaged.
 const PATCHES: (usize, usize) = (96, 48);
 /// Triangles that are projected at most, all directions together.

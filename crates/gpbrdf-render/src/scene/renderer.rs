@@ -40,8 +40,8 @@ const SAMPLES_PER_PASS: u32 = 4;
 /// ```
 ///
 /// A change of the scene starts the picture anew; a change of the [`Display`] does not. The result depends on
-/// the number of samples and on nothing else, so pictures can be repeated. There are no shadows, and light is
-/// reflected once.
+/// the number of samples and on nothing else, so pictures can be repeated. Light is reflected once,
+/// and the only shadow is that on a [`Ground`].
 #[derive(Debug)]
 pub struct Renderer {
     context: Context,

@@ -42,7 +42,10 @@ pub(crate) fn messages_ui(ctx: &Context, messages: &mut Messages) {
                 all = ui.button("Dismiss all").clicked();
             });
         }
-        egui::ScrollArea::vertical().max_height(SHARE * room.y).auto_shrink([false, true]).show(ui, |ui| {
+        // An area offers only the height that it had in the last frame.
+        let most = SHARE * room.y;
+        let scroll = egui::ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+        scroll.auto_shrink([false, true]).show(ui, |ui| {
             for (i, message) in messages.iter().enumerate() {
                 if message_ui(ui, message, width) {
                     read = Some(i);

@@ -261,14 +261,12 @@ fn captions_ui(ui: &mut Ui, picture: Rect, look: &SceneLook, compared: bool) {
 
 /// A text at the upper edge of a picture.
 fn caption_ui(ui: &mut Ui, room: Rect, align: Align, text: &str) {
-    let salt = (text.to_owned(), room.left().to_bits());
-    let builder = egui::UiBuilder::new().max_rect(room.shrink(6.0)).id_salt(salt);
-    ui.scope_builder(builder.layout(egui::Layout::top_down(align)), |ui| {
-        let back = egui::Frame::new().fill(Color32::from_black_alpha(170)).corner_radius(4);
-        back.inner_margin(egui::Margin::symmetric(6, 2)).show(ui, |ui| {
-            ui.label(RichText::new(text).color(Color32::WHITE));
-        });
-    });
+    let font = egui::FontId::proportional(13.0);
+    let galley = ui.painter().layout(text.to_owned(), font, Color32::WHITE, (room.width() - 24.0).max(40.0));
+    let align = egui::Align2([align, Align::Min]);
+    let rect = align.align_size_within_rect(galley.size(), room.shrink2(vec2(12.0, 8.0)));
+    ui.painter().rect_filled(rect.expand2(vec2(6.0, 2.0)), 4.0, Color32::from_black_alpha(170));
+    ui.put(rect, egui::Label::new(galley));
 }
 
 /// The places of two pictures side by side.
