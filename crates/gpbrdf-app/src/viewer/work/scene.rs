@@ -207,8 +207,10 @@ impl From<gpbrdf_render::Error> for Stop {
 pub(crate) fn spawn(
     outbox: Outbox<SceneResult>,
     context: Option<Context>,
-    busy: impl Fn() -> bool + Send + 'static,
+    busy: impl Fn() -> bool + Send + Sync + 'static,
 ) -> std::io::Result<Sender<SceneWork>> {
+    // The shared pool may be busy with a fit for seconds.
+    let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
     let measurer = Measurer::spawn(outbox.map(SceneResult::Quality))?;
     let mut scene = Scene {
         context,
@@ -224,7 +226,7 @@ pub(crate) fn spawn(
         handed: 0,
         measurer,
     };
-    Mailbox::spawn("scene", move |work: SceneWork, stale| {
+    let mut serve = move |work: SceneWork, stale: &(dyn Fn() -> bool + Sync)| {
         let SceneWork::Picture(request) = work else {
             // What goes wrong is found again, and told, with the first picture.
             if scene.warm_up().is_err() {
@@ -244,7 +246,8 @@ pub(crate) fn spawn(
             scene.clear();
             outbox.send(SceneResult::Failed(message));
         }
-    })
+    };
+    Mailbox::spawn("scene", move |work: SceneWork, stale| pool.install(|| serve(work, stale)))
 }
 
 struct Scene {

@@ -105,7 +105,13 @@ impl ObjectView {
 
     /// An object refines from the start: what a fit says is shown without waiting for its first picture.
     pub(super) fn progress(&self) -> Progress {
-        let smooth = self.shown.as_ref().is_some_and(|shown| shown.is_last && shown.request == self.requests);
+        let compared = self.requested.as_ref().is_some_and(|key| key.truth_is_tabulated);
+        let measured = |shown: &Shown| {
+            self.quality.is_some_and(|q| q.picture == shown.picture && Some(q.samples) == shown.samples)
+        };
+        let smooth = self.shown.as_ref().is_some_and(|shown| {
+            shown.is_last && shown.request == self.requests && (!compared || measured(shown))
+        });
         if smooth || self.requested.is_none() || self.failed.is_some() {
             Progress::Done
         } else {
