@@ -247,6 +247,7 @@ fn pictures_repeat_and_impossible_sizes_are_refused(context: &Context) {
     renderer.render_more(1).unwrap();
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places on the ground")]
 fn the_ground_is_seen_where_rays_meet_it(context: &Context) {
     let environment = Environment::new(Raster::filled(16, 8, [0.6; 3])).unwrap();
     let ground = Ground::new(&Geometry::Sphere, &environment, 400);
