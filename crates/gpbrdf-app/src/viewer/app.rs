@@ -153,7 +153,8 @@ impl Viewer {
         let (outbox, events) = Outbox::channel(&wake);
         let fitter = Fitter::new(outbox.map(Event::Fit))?;
         let watcher = Watcher::new(outbox.map(Event::Changed))?;
-        let start = Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()) };
+        let start =
+            Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()), awaited: fitter.awaited() };
         let open = Question {
             title: "Open materials",
             help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model, session, environment map or mesh:",

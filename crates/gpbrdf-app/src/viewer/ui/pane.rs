@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{Context, KeyboardShortcut, Ui};
@@ -223,6 +224,8 @@ pub(crate) struct Start {
     pub(crate) wake: Waker,
     /// A test of whether the fitter works; slower work waits meanwhile.
     pub(crate) busy: Arc<dyn Fn() -> bool + Send + Sync>,
+    /// Whether the first picture of an object is awaited, for which slower work makes room.
+    pub(crate) awaited: Arc<AtomicBool>,
 }
 
 impl Start {

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use gpbrdf_core::judge::CellMetrics;
@@ -197,7 +197,11 @@ impl Queue {
 pub(crate) struct Fitter {
     quick: Arc<Lane>,
     slow: Arc<Lane>,
+    awaited: Arc<AtomicBool>,
 }
+
+/// For so long what follows a mean waits for the first picture of it.
+const GRACE: Duration = Duration::from_millis(1500);
 
 impl Fitter {
     /// Starts the threads. The slow one computes in a pool of its own, so that the quick one never waits for a part of
@@ -206,15 +210,17 @@ impl Fitter {
         let [quick, slow] = [false, true].map(|is_slow| Arc::new(Lane { is_slow, ..Lane::default() }));
         let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
         let kept = Kept::default();
+        let awaited = Arc::new(AtomicBool::new(false));
         let (lane, samples, out) = (Arc::clone(&quick), Arc::clone(&kept), outbox.clone());
+        let picture = Arc::clone(&awaited);
         std::thread::Builder::new()
             .name("fitter".into())
-            .spawn(move || serve(&lane, &samples, &out, None))?;
-        let lane = Arc::clone(&slow);
+            .spawn(move || serve(&lane, &samples, &out, (None, &picture)))?;
+        let (lane, picture) = (Arc::clone(&slow), Arc::clone(&awaited));
         std::thread::Builder::new()
             .name("slow fitter".into())
-            .spawn(move || serve(&lane, &kept, &outbox, Some(&pool)))?;
-        Ok(Self { quick, slow })
+            .spawn(move || serve(&lane, &kept, &outbox, (Some(&pool), &picture)))?;
+        Ok(Self { quick, slow, awaited })
     }
 
     /// Requests a model.
@@ -238,6 +244,12 @@ impl Fitter {
             lane.lock().forgotten.push(document);
             lane.wake.notify_one();
         }
+    }
+
+    /// Whether the first picture of an object is awaited. Meanwhile the fitter leaves the processors to it, once there
+    /// is a mean.
+    pub(crate) fn awaited(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.awaited)
     }
 
     /// A test of whether there is anything quick to do; pictures wait meanwhile.
@@ -264,7 +276,12 @@ impl Drop for Fitter {
 /// Samples by document, kept while everything on which they depend stays the same.
 type Kept = Arc<Mutex<HashMap<DocumentId, Measured>>>;
 
-fn serve(lane: &Lane, kept: &Kept, outbox: &Outbox<Report>, pool: Option<&rayon::ThreadPool>) {
+fn serve(
+    lane: &Lane,
+    kept: &Kept,
+    outbox: &Outbox<Report>,
+    (pool, awaited): (Option<&rayon::ThreadPool>, &Arc<AtomicBool>),
+) {
     loop {
         let (request, cancel) = {
             let mut queue = lane.lock();
@@ -290,7 +307,8 @@ fn serve(lane: &Lane, kept: &Kept, outbox: &Outbox<Report>, pool: Option<&rayon:
         };
         let (document, number) = (request.document, request.number);
         let report = |news| outbox.send(Report { document, request: number, news });
-        let follower = Follower::new(&request, cancel, Arc::clone(kept), outbox.clone());
+        let follower =
+            Follower::new(&request, cancel, (Arc::clone(kept), Arc::clone(awaited)), outbox.clone());
         let result = match pool {
             Some(pool) => pool.install(|| run(&request, follower)),
             None => run(&request, follower),
@@ -337,6 +355,7 @@ struct Follower {
     version: u64,
     cancel: Arc<AtomicBool>,
     kept: Kept,
+    awaited: Arc<AtomicBool>,
     outbox: Outbox<Report>,
     /// The progress that was last reported.
     told: Mutex<Progress>,
@@ -347,10 +366,15 @@ const EVALUATIONS: usize = 8;
 const SHARE: f64 = 0.005;
 
 impl Follower {
-    fn new(request: &Request, cancel: Arc<AtomicBool>, kept: Kept, outbox: Outbox<Report>) -> Self {
+    fn new(
+        request: &Request,
+        cancel: Arc<AtomicBool>,
+        (kept, awaited): (Kept, Arc<AtomicBool>),
+        outbox: Outbox<Report>,
+    ) -> Self {
         let version = VERSION.fetch_add(1, Ordering::Relaxed);
         let (document, request) = (request.document, request.number);
-        Self { document, request, version, cancel, kept, outbox, told: Mutex::default() }
+        Self { document, request, version, cancel, kept, awaited, outbox, told: Mutex::default() }
     }
 
     fn tell(&self, news: News) {
@@ -367,6 +391,14 @@ impl Observer for Follower {
     fn begin(&self, stage: Stage) {
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = Progress::default();
         self.tell(News::Stage(stage));
+        let start = Instant::now();
+        while matches!(stage, Stage::BakeSigma | Stage::Truth)
+            && self.awaited.load(Ordering::Relaxed)
+            && start.elapsed() < GRACE
+            && !self.is_cancelled()
+        {
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     fn progress(&self, progress: Progress) {

@@ -41,6 +41,8 @@ const MEANINGS: [&str; 4] =
 const AXES: egui::Vec2 = vec2(72.0, 40.0);
 /// Height of a view's title and the gap below it.
 const TITLE: f32 = 46.0;
+/// From this height on a view has room for what its colours mean; the tooltip of its title says it, too.
+const CAPTIONED: f32 = 180.0;
 /// Between two views.
 const GAP: f32 = 10.0;
 /// From this width on, all tools are in one row.
@@ -323,7 +325,7 @@ impl Grid<'_> {
         let side = (size.x - AXES.x).min(size.y - AXES.y - TITLE).max(40.0);
         ui.scope(|ui| {
             ui.set_max_width(side + AXES.x - 14.0);
-            title_ui(ui, i, self.shown.limits[i]);
+            title_ui(ui, i, self.shown.limits[i], size.y > CAPTIONED);
         });
         let room = ui.available_size();
         let side = (room.x - AXES.x).min(room.y - AXES.y).max(40.0);
@@ -453,7 +455,7 @@ fn slice_plot(i: usize, side: f32, square: bool, visuals: &Visuals) -> Plot<'sta
 }
 
 /// The title of a view, with the scale of its false colours and with what its colours mean.
-fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
+fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>, captioned: bool) {
     ui.spacing_mut().item_spacing.y = 1.0;
     ui.horizontal(|ui| {
         ui.label(RichText::new(TITLES[i]).strong()).on_hover_text(MEANINGS[i]);
@@ -470,7 +472,9 @@ fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
             ui.label(RichText::new(low).small());
         });
     });
-    ui.add(egui::Label::new(RichText::new(MEANINGS[i]).small()).truncate());
+    if captioned {
+        ui.add(egui::Label::new(RichText::new(MEANINGS[i]).small()).truncate());
+    }
 }
 
 /// The place of degrees of `theta_h` on an axis with the warp of the table.

@@ -1,6 +1,7 @@
 //! The lit object as the graphics device shows it.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use eframe::egui::{self, Align, Color32, Context, Rect, RichText, TextureHandle, Ui, pos2, vec2};
 use gpbrdf_core::figure::Colormap;
@@ -41,6 +42,8 @@ pub(super) struct ObjectView {
     /// `None` once the view is closed.
     worker: Option<Sender<SceneWork>>,
     is_prepared: bool,
+    /// Whether the first picture is awaited, for the fitter.
+    awaited: Arc<AtomicBool>,
     requests: u64,
     requested: Option<SceneKey>,
     shown: Option<Shown>,
@@ -61,6 +64,7 @@ impl ObjectView {
         Ok(Self {
             worker: Some(spawn(outbox, device, start.busy())?),
             is_prepared: false,
+            awaited: Arc::clone(&start.awaited),
             requests: 0,
             requested: None,
             shown: None,
@@ -79,6 +83,7 @@ impl ObjectView {
         let SceneImage { document, request, picture, samples, is_last, limits, .. } = new;
         self.shown = Some(Shown { document, request, picture, texture, beside, samples, is_last, limits });
         self.failed = None;
+        self.awaited.store(false, Ordering::Relaxed);
     }
 
     /// Drops what is shown, so that it is requested again.
@@ -89,6 +94,7 @@ impl ObjectView {
     /// Shows why there is no picture. It is not requested again before anything changes.
     pub(super) fn fail(&mut self, message: String) {
         (self.shown, self.quality, self.failed) = (None, None, Some(message));
+        self.awaited.store(false, Ordering::Relaxed);
     }
 
     /// Ends the worker. The graphics driver must not be unloaded while it runs.
@@ -126,6 +132,7 @@ impl ObjectView {
         if !self.is_prepared {
             self.is_prepared = true;
             worker.put(SceneWork::Prepare);
+            self.awaited.store(true, Ordering::Relaxed);
         }
         let Some(document) = cx.documents.selected() else { return };
         let Some(fitted) = &document.fitted else { return };
