@@ -26,7 +26,7 @@ fn a_number_goes_back_to_its_default() {
 fn every_control_has_a_name() {
     let mut driver = Driver::new(&[PathBuf::from("ward"), PathBuf::from("lambert")]);
     driver.fitted();
-    for key in [Key::Num1, Key::Num2, Key::Num3, Key::Num4] {
+    for key in [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6] {
         driver.harness.key_press(key);
         driver.harness.run_steps(3);
         for node in driver.harness.root().children_recursive() {
@@ -224,7 +224,7 @@ fn arrow_keys_move_a_view_that_has_the_focus() {
     driver.slide("Samples", 1500.0);
     driver.fitted();
     driver.press(Key::Num4);
-    driver.wait("a sphere", |d| d.viewer().is_settled());
+    driver.wait("a sphere", |d| d.after("SSIM ").is_some());
     let focus = |driver: &mut Driver, view: &str| {
         driver.harness.get_by_label_contains(view).focus();
         driver.harness.run_steps(3);

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use eframe::egui::Key;
+use eframe::egui::{self, Key};
+use egui_kittest::kittest::Queryable;
 use gpbrdf_core::formats::write_samples_csv;
 use gpbrdf_core::{Layout, SampleSet, Source};
 
@@ -54,6 +55,44 @@ fn what_to_measure_next_is_planned_listed_and_exported() {
         rows.iter().zip(["value", "1", "2", "3", "4"]).map(|(row, v)| format!("{row},{v}")).collect();
     std::fs::write(&plan, filled.join("\n")).unwrap();
     assert_eq!(Source::open(&plan).unwrap().samples().unwrap().len(), 4);
+}
+
+#[test]
+fn measurements_and_the_lobe_are_shown_with_their_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("measured.csv");
+    let rows: String = [0, 20, 40, 60]
+        .iter()
+        .map(|theta| format!("30,0,{theta},180,{}\n50,0,{theta},90,0.5\n", 1.0 + f64::from(*theta) / 100.0))
+        .collect();
+    std::fs::write(&file, format!("theta_i,phi_i,theta_o,phi_o,f\n{rows}")).unwrap();
+    let mut driver = Driver::new(&[file]);
+    driver.fitted();
+    driver.press(Key::Num6);
+    driver.slide("Light θi", 30.0);
+    driver.wait("the measurements", |d| d.shows("Measured directions of measured, 4 shown"));
+    assert!(driver.shows("Lobe of the prediction"));
+    driver.slide("Light θi", 50.0);
+    assert!(driver.shows("Measured directions of measured, 4 shown"));
+    driver.slide("Light θi", 80.0);
+    assert!(driver.shows("Measured directions of measured, 0 shown") && driver.shows("move the light"));
+    // In the middle of the lobe there is a direction, whose values are read.
+    driver.slide("Light θi", 30.0);
+    driver.wait("sigma", |d| d.shows("shell: up to 97.5 %"));
+    let rect = driver.harness.get_by_label_contains("Lobe in 3-D").rect();
+    let before = driver.picture();
+    for share in [0.5, 0.45, 0.4, 0.55] {
+        driver.harness.hover_at(rect.lerp_inside(egui::vec2(0.5, share)));
+        driver.harness.run_steps(4);
+        if driver.shows("f cos θo") && driver.shows("95 %") {
+            break;
+        }
+    }
+    assert!(driver.texts().iter().any(|text| text.ends_with(" 1/sr")), "{:?}", driver.texts());
+    driver.harness.get_by_label_contains("Lobe in 3-D").focus();
+    driver.harness.run_steps(3);
+    driver.press(Key::ArrowRight);
+    assert!(driver.picture() != before);
 }
 
 #[test]

@@ -25,7 +25,7 @@ impl Driver {
 
     /// A window of this size, in points.
     pub(crate) fn sized(files: &[PathBuf], size: [f32; 2]) -> Self {
-        Self::with(files, size, Settings::default())
+        Self::set(files, size, "{}")
     }
 
     /// A window with settings from an earlier run.
@@ -34,9 +34,11 @@ impl Driver {
         Self::around(size, move |ctx| Viewer::new(ctx, settings, &files).unwrap())
     }
 
-    /// A window with settings as JSON.
+    /// A window with settings as JSON, whose hint of the first run has been read.
     pub(crate) fn set(files: &[PathBuf], size: [f32; 2], settings: &str) -> Self {
-        Self::with(files, size, serde_json::from_str(settings).unwrap())
+        let mut settings: serde_json::Value = serde_json::from_str(settings).unwrap();
+        settings["hint"] = false.into();
+        Self::with(files, size, serde_json::from_value(settings).unwrap())
     }
 
     /// A window around a viewer that `make` makes.

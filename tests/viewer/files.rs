@@ -46,13 +46,14 @@ fn slices_models_and_sessions_are_written_and_read_again() {
 }
 
 #[test]
-fn the_sphere_is_written_and_curves_of_all_kinds_are_drawn() {
+fn the_picture_is_written_and_curves_of_all_kinds_are_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let mut driver = Driver::new(&[PathBuf::from("lambert")]);
+    let mut driver = Driver::set(&[PathBuf::from("lambert")], [720.0, 480.0], "{\"view\": \"3d\"}");
     driver.slide("Samples", 1500.0);
-    driver.wait("the sphere", |d| d.viewer().is_settled());
+    driver.wait("a picture", |d| d.after("SSIM ").is_some());
     driver.click("File");
-    driver.click("Export sphere…");
+    // It is written once the picture is smooth.
+    driver.click("Export picture…");
     let path = folder.path().join("ball.png");
     driver.enter("Path", &path.display().to_string());
     driver.click("Write");
@@ -60,11 +61,46 @@ fn the_sphere_is_written_and_curves_of_all_kinds_are_drawn() {
     for name in ["ball-truth.exr", "ball-prediction.exr"] {
         assert!(exists(&folder.path().join(name)), "{name}");
     }
+    driver.press(Key::Num3);
     for name in ["Over θh", "Over θd", "Over φd", "Albedo"] {
         driver.harness.get_by_label(name).click();
         driver.harness.run_steps(4);
         assert!(driver.harness.query_by_label(&format!("{name} plot")).is_some(), "{name}");
     }
+}
+
+#[test]
+fn curves_are_written_with_their_numbers_and_their_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::new(&[PathBuf::from("lambert"), PathBuf::from("ward")]);
+    driver.fitted();
+    driver.harness.get_by_label("Over θh").click();
+    driver.harness.run_steps(4);
+    driver.click("File");
+    driver.click("Export curves…");
+    let path = folder.path().join("curves.csv");
+    driver.give_path(&path, "Write");
+    driver.wait("a note", |d| d.shows("curves.csv\" and its picture"));
+    let text = std::fs::read_to_string(&path).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().skip(2).map(|line| line.split(',').collect()).collect();
+    for name in ["lambert", "ward"] {
+        let source = Source::built_in(name).unwrap();
+        let brdf = source.brdf().unwrap();
+        let mine: Vec<_> = rows.iter().filter(|row| row[0] == format!("\"{name}\"")).collect();
+        assert!(mine.len() > 100, "{name}: {}", mine.len());
+        for row in mine {
+            let number = |i: usize| row[i].parse::<f64>().unwrap();
+            // The plot cuts at theta_d = 30 and phi_d = 90 degrees; tables are interpolated.
+            let [theta_h, theta_d, phi_d] = [number(1), 30.0, 90.0].map(f64::to_radians);
+            let rgb = brdf.eval_half_diff(HalfDiff { theta_h, theta_d, phi_d });
+            let expected = rgb.iter().sum::<f64>() / 3.0;
+            assert!((number(2) - expected).abs() < 0.02 * expected + 1e-3, "{name}: {row:?}, not {expected}");
+            assert!(number(4) <= number(3) && number(3) <= number(5), "{row:?}");
+        }
+    }
+    let picture = image::open(path.with_extension("png")).unwrap().into_rgb8();
+    let colours: std::collections::HashSet<_> = picture.pixels().collect();
+    assert!(picture.width() > 300 && colours.len() > 20, "{:?} {}", picture.dimensions(), colours.len());
 }
 
 #[test]

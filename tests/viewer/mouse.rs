@@ -62,7 +62,7 @@ fn the_sphere_turns_zooms_swipes_and_is_reset() {
     let mut driver = Driver::new(&[PathBuf::from("lambert")]);
     driver.slide("Samples", 1500.0);
     driver.press(Key::Num4);
-    driver.wait("a sphere", |d| d.viewer().is_settled());
+    driver.wait("a sphere", |d| d.after("SSIM ").is_some());
     let middle = driver.harness.get_by_label_contains("Sphere view").rect().center();
     drag(&mut driver, middle, egui::vec2(80.0, 40.0), PointerButton::Primary, Modifiers::NONE);
     let turned = read(&mut driver, "Light", &["Turned", "Tilted"]);

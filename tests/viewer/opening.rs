@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use eframe::egui::accesskit::Role;
 use eframe::egui::{self, Key};
 use egui_kittest::kittest::{NodeT, Queryable};
+use gpbrdf_app::viewer::Settings;
 use gpbrdf_core::BrdfTable;
 use gpbrdf_core::formats::{ExrPart, write_merl, write_table_exr};
 
@@ -182,6 +183,52 @@ fn many_errors_all_stay_until_they_are_read() {
         assert_eq!(shown, left);
     }
     assert!(driver.harness.query_by_label("Show lambert").is_some());
+}
+
+#[test]
+fn messages_float_and_move_nothing() {
+    let mut driver = Driver::new(&[PathBuf::from("lambert")]);
+    driver.fitted();
+    let places = |driver: &Driver| {
+        ["Sphere view", "Lobe plot", "Prediction slice"]
+            .map(|view| driver.harness.get_by_label_contains(view).rect())
+    };
+    let before = places(&driver);
+    for i in 0..6 {
+        driver.press_with_ctrl(Key::O);
+        driver.enter("Path to open", &format!("/no/such/folder/with/a/long/name/measurement-{i}.bsdf"));
+        driver.click("Open");
+        driver.wait("a message", |d| d.shows(&format!("measurement-{i}.bsdf")));
+        driver.press(Key::Escape);
+    }
+    assert_eq!(places(&driver), before);
+    // All six can be read: each is whole, within the window, and none is over another.
+    let texts: Vec<egui::Rect> = (0..6)
+        .map(|i| driver.harness.get_by_label_contains(&format!("measurement-{i}.bsdf")).rect())
+        .collect();
+    for (i, rect) in texts.iter().enumerate() {
+        assert!(rect.min.y > 0.0 && rect.max.y < 1000.0 && rect.max.x < 1440.0, "{rect}");
+        assert!(texts[..i].iter().all(|other| !rect.shrink(1.0).intersects(*other)), "{texts:?}");
+    }
+    driver.click("Dismiss all");
+    assert!(driver.harness.query_by_label("Dismiss").is_none());
+}
+
+#[test]
+fn the_first_run_has_a_hint_that_stays_away_once_it_is_read() {
+    let files = [PathBuf::from("lambert")];
+    let mut driver = Driver::with(&files, [1440.0, 1000.0], Settings::default());
+    driver.fitted();
+    assert!(driver.shows("H shows all keys"));
+    driver.click("Got it");
+    assert!(!driver.shows("H shows all keys"));
+    let kept = serde_json::to_string(&driver.viewer().settings()).unwrap();
+    let mut again = Driver::with(&files, [1440.0, 1000.0], serde_json::from_str(&kept).unwrap());
+    again.fitted();
+    assert!(!again.shows("H shows all keys"));
+    again.click("Help");
+    again.click("First steps");
+    assert!(again.shows("H shows all keys"));
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn open(settings: Settings) -> Driver {
 
 /// Frames while an object is lit and measured and the model refitted.
 fn with_an_object() {
-    let settings = "{\"panes\": {\"3d\": {\"shape\": \"Knot\", \"shown\": \"SideBySide\"}}}";
+    let settings = "{\"hint\": false, \"panes\": {\"3d\": {\"shape\": \"Knot\", \"shown\": \"SideBySide\"}}}";
     let mut driver = open(serde_json::from_str(settings).unwrap());
     until(&mut driver, Viewer::is_fitted);
     driver.state_mut().as_mut().unwrap().reset_frame_times();
@@ -83,7 +83,7 @@ fn with_an_object() {
 }
 
 fn main() {
-    let mut driver = open(Settings::default());
+    let mut driver = open(serde_json::from_str("{\"hint\": false}").unwrap());
     let first = until(&mut driver, |v| v.shown_version() > 0);
     println!("first picture after {:.0} ms", 1e3 * first.as_secs_f64());
     until(&mut driver, Viewer::is_settled);
@@ -121,5 +121,6 @@ fn main() {
             until(&mut driver, |v| v.shown_version() != before);
         }
     }
+    driver.state_mut().as_mut().unwrap().close();
     with_an_object();
 }

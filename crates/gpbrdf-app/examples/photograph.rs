@@ -14,7 +14,7 @@ use gpbrdf_app::viewer::{Settings, Viewer};
 use gpbrdf_core::formats::write_samples_csv;
 use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, plan};
 use gpbrdf_core::prior::Prior;
-use gpbrdf_core::{Sample, SampleSet, Source};
+use gpbrdf_core::{Layout, Sample, SampleSet, Source};
 
 type Result<T = (), E = Box<dyn std::error::Error>> = std::result::Result<T, E>;
 
@@ -24,27 +24,33 @@ struct Scene {
     /// Size of the window in points, and pixels per point.
     size: [f32; 2],
     scale: f32,
-    /// Whether the open material is a file of twenty measurements in planned directions.
-    is_measured: bool,
+    /// What is open: names of built-in materials and files, and what [`opened`] makes.
+    open: &'static [&'static str],
     /// What the viewer would remember from an earlier run; the rest is as at first.
     settings: &'static str,
     /// The label of what the pointer is on.
     hovered: Option<&'static str>,
-    /// How long a picture converges that never ends by itself.
-    converges: Duration,
+    /// Whether the picture is taken so long after the start, whatever is going on, and not once everything is over.
+    after: Option<Duration>,
 }
 
 const PLAIN: Scene = Scene {
     name: "viewer-overview",
     size: [1360.0, 850.0],
     scale: 1.0,
-    is_measured: false,
+    open: &[],
     settings: "{}",
     hovered: None,
-    converges: Duration::ZERO,
+    after: None,
 };
 
-const SCENES: [Scene; 6] = [
+/// A file of twenty measurements in planned directions, one of thousands in random ones, which takes a while to fit,
+/// and files that do not exist.
+const MEASURED: &str = "rough-copper.csv";
+const MANY: &str = "many.csv";
+const MISSING: [&str; 6] = ["a.bsdf", "b.bsdf", "c.binary", "d.csv", "e.json", "f.exr"];
+
+const SCENES: [Scene; 14] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
@@ -60,11 +66,35 @@ const SCENES: [Scene; 6] = [
     Scene {
         name: "viewer-object",
         settings: r#"{"view": "3d", "panes": {"3d": {"shape": "Knot", "shown": "SideBySide"}}}"#,
-        converges: Duration::from_secs(5),
         ..PLAIN
     },
-    Scene { name: "viewer-directions", is_measured: true, settings: r#"{"view": "directions"}"#, ..PLAIN },
+    Scene { name: "viewer-directions", open: &[MEASURED], settings: r#"{"view": "directions"}"#, ..PLAIN },
     Scene { name: "viewer-large-text", size: [800.0, 500.0], scale: 2.0, ..PLAIN },
+    // To look at while the viewer is changed; no document shows them.
+    Scene {
+        name: "check-first-second",
+        settings: r#"{"hint": true}"#,
+        after: Some(Duration::from_secs(2)),
+        ..PLAIN
+    },
+    Scene { name: "check-data", open: &[MEASURED], settings: r#"{"view": "data"}"#, ..PLAIN },
+    Scene { name: "check-glossy", open: &["silver-paint"], ..PLAIN },
+    Scene {
+        name: "check-five-materials",
+        open: &["ward", "lambert", MANY, "red-plastic", "cook-torrance"],
+        after: Some(Duration::from_secs(8)),
+        ..PLAIN
+    },
+    Scene { name: "check-errors", open: &MISSING, ..PLAIN },
+    Scene { name: "check-light", open: &["purple-paint", "ward"], settings: r#"{"dark": false}"#, ..PLAIN },
+    Scene { name: "check-small", size: [1024.0, 700.0], ..PLAIN },
+    Scene {
+        name: "check-large-text",
+        size: [680.0, 425.0],
+        scale: 2.0,
+        settings: r#"{"view": "plots"}"#,
+        ..PLAIN
+    },
 ];
 
 /// The empty margin that the harness leaves around the viewer, in points.
@@ -83,21 +113,43 @@ fn main() -> Result {
         return Err(format!("expected pictures out of {known}, found {unknown}").into());
     }
     for scene in &SCENES {
-        if names.is_empty() || names.iter().any(|name| name == scene.name) {
+        let chosen = if names.is_empty() {
+            scene.name.starts_with("viewer-")
+        } else {
+            names.iter().any(|name| name == scene.name)
+        };
+        if chosen {
             photograph(scene, &folder.join(scene.name).with_extension("png"))?;
         }
     }
     Ok(())
 }
 
-fn photograph(scene: &Scene, file: &Path) -> Result {
-    let settings: Settings = serde_json::from_str(scene.settings)?;
-    let folder = tempfile::tempdir()?;
-    let mut files = Vec::new();
-    if scene.is_measured {
-        files.push(folder.path().join("rough-copper.csv"));
-        write_samples_csv(&files[0], &planned_measurements("cook-torrance", 20)?)?;
+/// A built-in material by its name, or a file of this name in the folder, which is made where it is one that can be.
+fn opened(name: &str, folder: &Path) -> Result<PathBuf> {
+    let path = folder.join(name);
+    match name {
+        MEASURED => write_samples_csv(&path, &planned_measurements("cook-torrance", 20)?)?,
+        MANY => {
+            let source = Source::built_in("blue-metallic-paint")?;
+            let layout = Layout::Hemisphere { count: 6000, seed: 1 };
+            write_samples_csv(&path, &SampleSet::measure(source.brdf()?, &layout)?)?;
+        }
+        _ if MISSING.contains(&name) => {}
+        _ => return Ok(PathBuf::from(name)),
     }
+    Ok(path)
+}
+
+fn photograph(scene: &Scene, file: &Path) -> Result {
+    let mut settings: serde_json::Value = serde_json::from_str(scene.settings)?;
+    if settings.get("hint").is_none() {
+        settings["hint"] = false.into();
+    }
+    let settings: Settings = serde_json::from_value(settings)?;
+    let folder = tempfile::tempdir()?;
+    let files: Result<Vec<PathBuf>> = scene.open.iter().map(|name| opened(name, folder.path())).collect();
+    let files = files?;
     let mut first_error = None;
     let mut harness = Harness::builder()
         .with_size(scene.size)
@@ -120,14 +172,26 @@ fn photograph(scene: &Scene, file: &Path) -> Result {
             },
             None,
         );
-    wait(&mut harness, |viewer| viewer.is_some_and(Viewer::is_settled))?;
     let start = Instant::now();
-    wait(&mut harness, |_| start.elapsed() >= scene.converges)?;
+    match scene.after {
+        Some(after) => {
+            let mut is_lit = false;
+            while start.elapsed() < after {
+                harness.step();
+                std::thread::sleep(Duration::from_millis(5));
+                if !is_lit && harness.query_by_label("preview").is_some() {
+                    is_lit = true;
+                    println!("lit after {} ms", start.elapsed().as_millis());
+                }
+            }
+        }
+        None => wait(&mut harness, |viewer| viewer.is_some_and(Viewer::is_settled))?,
+    }
     if let Some(label) = scene.hovered {
         let middle = harness.get_by_label(label).rect().center();
         harness.hover_at(middle);
     }
-    harness.run_steps(20);
+    harness.run_steps(if scene.after.is_some() { 1 } else { 20 });
     let picture = harness.render()?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
     let margin = (MARGIN * scene.scale) as u32;

@@ -111,6 +111,12 @@ pub(crate) struct Display {
     pub(crate) limit: f32,
     /// [`ShowKind::Split`]: the column where the prediction begins, as a share of the width.
     pub(crate) split: f32,
+    /// Texels along each side of the ground; 0 where there is none.
+    pub(crate) ground_size: u32,
+    /// Half of a side of the ground, and its height.
+    pub(crate) ground_half: f32,
+    pub(crate) ground_height: f32,
+    pub(crate) padding: f32,
 }
 
 /// `Separable` of `bake/separable.wgsl`.

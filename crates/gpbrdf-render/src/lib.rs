@@ -76,6 +76,7 @@ pub use material::density_buffer;
 pub use scene::camera::{Camera, Projection};
 pub use scene::display::{Background, Display, Encoding, Show, ToneCurve};
 pub use scene::gbuffer::Geometry;
+pub use scene::ground::Ground;
 pub use scene::light::{EnvironmentLight, Light};
 pub use scene::mesh::{MAX_TRIANGLES, Mesh};
 pub use scene::mesh_file::{is_mesh, parse_mesh, read_mesh};

@@ -33,7 +33,7 @@ pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
 pub(crate) use forecast::{memory_bytes, remaining, samples_within};
 #[cfg(feature = "viewer")]
-pub(crate) use hyper::hyper_sliders;
+pub(crate) use hyper::{bound_name, hyper_sliders};
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
 pub(crate) use plan_file::{expected_errors, plan_csv};

@@ -186,7 +186,7 @@ impl ModelSpec {
     }
 
     /// Number of samples of a source that can be evaluated at any direction, off a lattice.
-    pub(super) fn scattered_samples(&self) -> usize {
+    pub(crate) fn scattered_samples(&self) -> usize {
         self.samples.unwrap_or(SCATTERED_SAMPLES)
     }
 

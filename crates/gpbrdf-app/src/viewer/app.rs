@@ -14,6 +14,7 @@ use gpbrdf_core::Source;
 use super::state::document::{Document, DocumentId, Work};
 use super::state::session::{SavedDocument, Session};
 use super::state::settings::Settings;
+use super::ui::hint::hint_ui;
 use super::ui::layout::{self, Panes};
 use super::ui::menu::Menu;
 use super::ui::messages::messages_ui;
@@ -21,6 +22,7 @@ use super::ui::pane::{Command, Offers, Order, Pane, PaneContext, Progress, Shown
 use super::ui::panes;
 use super::ui::shortcuts::{self, Action};
 use super::ui::status::status_ui;
+use super::ui::theme;
 use super::ui::windows::{Reply, Windows};
 use super::work::dialogs::{self, Access, Question};
 use super::work::export::{self, Saved};
@@ -83,6 +85,8 @@ pub struct Viewer {
     panes: Vec<Box<dyn Pane>>,
     windows: Windows,
     fitter: Fitter,
+    /// The number of the last request.
+    requests: u64,
     watcher: Watcher,
     outbox: Outbox<Event>,
     events: Receiver<Event>,
@@ -149,7 +153,8 @@ impl Viewer {
         let (outbox, events) = Outbox::channel(&wake);
         let fitter = Fitter::new(outbox.map(Event::Fit))?;
         let watcher = Watcher::new(outbox.map(Event::Changed))?;
-        let start = Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()) };
+        let start =
+            Start { wake: Arc::clone(&wake), busy: Arc::new(fitter.busy()), awaited: fitter.awaited() };
         let open = Question {
             title: "Open materials",
             help: "A MERL .binary, RGL .bsdf, samples CSV, OpenEXR table, model, session, environment map or mesh:",
@@ -178,10 +183,11 @@ impl Viewer {
         ctx.set_zoom_factor(settings.zoom.clamp(0.5, 3.0));
         let mut viewer = Self {
             settings,
-            context: PaneContext::new(outbox.map(Event::Saved)),
+            context: PaneContext::new(ctx.clone(), outbox.map(Event::Saved)),
             panes: panes::all(&start)?,
             windows: Windows::new(open),
             fitter,
+            requests: 0,
             watcher,
             outbox,
             events,
@@ -325,7 +331,7 @@ impl Viewer {
             match event {
                 Event::Fit(report) => self.take(report),
                 Event::Found(found) => self.take_found(found),
-                Event::Saved(Ok(note)) => self.context.messages.note(note),
+                Event::Saved(Ok(note)) => self.context.messages.success(note),
                 Event::Saved(Err(message)) => self.context.messages.error(message),
                 Event::Browsed((question, paths)) => self.answer(&question, paths),
                 Event::Open(path) => self.open_paths(&[path]),
@@ -339,9 +345,10 @@ impl Viewer {
         }
     }
 
-    /// Takes in what the fitter reports about a document, unless it has been closed.
+    /// Takes in what the fitter reports about a document, unless that has been closed or has requested something else.
     fn take(&mut self, report: Report) {
-        let Some(document) = self.context.documents.get_mut(report.document) else { return };
+        let document = self.context.documents.get_mut(report.document);
+        let Some(document) = document.filter(|d| d.request == report.request) else { return };
         if let News::Failed(message) = &report.news {
             self.context.messages.error(format!("{}: {message}", document.name));
         }
@@ -381,6 +388,7 @@ impl Viewer {
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Action::TogglePanels => self.settings.panels ^= true,
             Action::Help => self.windows.toggle_help(),
+            Action::Hint => self.settings.hint = true,
             Action::Cancel => {
                 let selected = self.context.documents.selected_id();
                 if let Some(id) = selected.filter(|_| !self.windows.close_all()) {
@@ -431,11 +439,14 @@ impl Viewer {
                 continue;
             }
             document.requested = Some(document.spec.clone());
+            self.requests += 1;
+            document.request = self.requests;
             if !document.is_busy() {
                 document.work = Work::Waiting;
             }
             self.fitter.submit(fitter::Request {
                 document: document.id,
+                number: self.requests,
                 source: Arc::clone(&document.source),
                 truth: document.truth.clone(),
                 spec: document.spec.clone(),
@@ -459,7 +470,6 @@ impl Viewer {
                 self.act(&ctx, action);
             }
         }
-        messages_ui(ui, &mut self.context.messages);
         if self.settings.panels {
             let last = self.frames.last;
             Panel::bottom("status").show(ui, |ui| status_ui(ui, &self.context.documents, last));
@@ -470,6 +480,10 @@ impl Viewer {
         }
         let frame = Frame::central_panel(ui.style()).inner_margin(10);
         CentralPanel::default().frame(frame).show(ui, |ui| panes.views_ui(ui));
+        if self.settings.hint {
+            self.settings.hint = !hint_ui(&ctx);
+        }
+        messages_ui(&ctx, &mut self.context.messages);
         match self.windows.ui(&ctx, commands) {
             Some(Reply::Path(question, path)) => self.answer(&question, vec![path]),
             Some(Reply::BuiltIn(name)) => self.open_built_in(name, None),
@@ -488,12 +502,6 @@ impl Viewer {
             Some(true) => egui::ThemePreference::Dark,
             Some(false) => egui::ThemePreference::Light,
         });
-        ctx.all_styles_mut(|style| {
-            style.spacing.item_spacing = egui::vec2(8.0, 5.0);
-            style.spacing.button_padding = egui::vec2(7.0, 3.0);
-            if let Some(small) = style.text_styles.get_mut(&egui::TextStyle::Small) {
-                small.size = 11.0;
-            }
-        });
+        theme::apply(ctx);
     }
 }

@@ -23,12 +23,32 @@ use eframe::egui;
 pub use app::{FrameTimes, Viewer};
 pub use state::settings::Settings;
 
-/// See a measured material, its Gaussian-process prediction and the error, and change the model live.
+/// What `--help` says after the arguments.
+const HELP: &str = "\
+What to do first:
+  gpbrdf-viewer                        a built-in material, lit; everything can be tried on it
+  gpbrdf-viewer measured.csv           your measurements: the material that they make, and what to measure next
+  gpbrdf-viewer satin.bsdf ward        a file beside a built-in material (Materials in the menu has all names)
+  gpbrdf-viewer all.json               a session, as it was saved
+
+In the window: H shows all keys, Ctrl+O opens more, 1 to 6 choose a view, Escape cancels what is running.
+Angles are in degrees, BRDF values in 1/sr. Settings are kept from run to run. For work without a window there is
+gpbrdf-cli.";
+
+/// A window on measured materials: what a Gaussian process makes of few measurements, lit, with its error bar, beside
+/// the truth where that is known. The model can be changed while you look.
 #[derive(Debug, Parser)]
-#[command(name = "gpbrdf-viewer", version, about, max_term_width = 100)]
+#[command(
+    name = "gpbrdf-viewer",
+    version,
+    about = "A window on measured materials: what a Gaussian process makes of them, lit, with its error bar",
+    long_about,
+    after_help = HELP,
+    max_term_width = 120
+)]
 struct Arguments {
     /// Materials, models, sessions, environment maps and meshes to open, whichever each file holds, or names of
-    /// built-in materials.
+    /// built-in materials; without any, one built-in material.
     files: Vec<PathBuf>,
     /// Whether open files of measurements are read again when they change, so that a measurement that is added to one
     /// is fitted at once.
@@ -137,4 +157,21 @@ fn run(arguments: &Arguments, kept: &Rc<RefCell<Option<Viewer>>>) -> eframe::Res
 /// The files that were dropped on the window.
 fn dropped_paths(input: &egui::RawInput) -> Vec<PathBuf> {
     input.dropped_files.iter().map(|file| file.path().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn its_help_is_its_own() {
+        let help = Arguments::command().render_long_help().to_string();
+        for part in ["gpbrdf-viewer measured.csv", "Ctrl+O", "--watch", "degrees", "1/sr"] {
+            assert!(help.contains(part), "{part} is not in {help}");
+        }
+        assert!(!help.contains("gpbrdf-cli bake"));
+        assert!(help.lines().all(|line| line.chars().count() <= 120), "{help}");
+    }
 }

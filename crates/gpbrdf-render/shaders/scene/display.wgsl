@@ -17,6 +17,12 @@ struct Display {
     limit: f32,
     // SHOW_SPLIT: the column where the prediction begins, as a share of the width.
     split: f32,
+    // Texels along each side of the ground; 0 where there is none.
+    ground_size: u32,
+    // Half of a side of the ground, and its height.
+    ground_half: f32,
+    ground_height: f32,
+    padding: f32,
 }
 
 const SHOW_TRUTH: u32 = 0u;
@@ -49,6 +55,8 @@ const NEUTRAL: vec3f = vec3f(0.1333, 0.1333, 0.149);
 @group(0) @binding(3) var environment: texture_2d<f32>;
 // 256 colours of each of two maps.
 @group(0) @binding(4) var colours: texture_2d<f32>;
+// Radiance of the ground: rows along z, columns along x.
+@group(0) @binding(6) var<storage, read> ground: array<vec4f>;
 @group(0) @binding(5) var picture: texture_storage_2d<rgba8unorm, write>;
 
 // The linear brightness of a screen, in [0, 1], that stands for a radiance.
@@ -77,7 +85,7 @@ fn encoded(linear: vec3f) -> vec3f {
     return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
 }
 
-// The radiance of the map in the direction of a pixel, interpolated linearly.
+// The radiance behind objects in the direction of a pixel: that of the ground, or of the map.
 fn background_radiance(pixel: vec2u) -> vec3f {
     let at = place_in_frame(view, vec2f(pixel) + 0.5);
     // Parallel rays all see the same point of the map. They get the background of an angle of view of 30
@@ -88,6 +96,37 @@ fn background_radiance(pixel: vec2u) -> vec3f {
         across = at.x * view.right.xyz + at.y * view.up.xyz;
     }
     let w = normalize(view.forward.xyz + across);
+    let behind = map_radiance(w);
+    if display.ground_size == 0u || view.eye.w == 0.0 || view.eye.y <= display.ground_height || w.y >= -1e-4 {
+        return behind;
+    }
+    let met = view.eye.xyz + (display.ground_height - view.eye.y) / w.y * w;
+    let distance = length(met.xz) / display.ground_half;
+    let fade = smoothstep(0.25, 1.0, distance);
+    if fade >= 1.0 {
+        return behind;
+    }
+    return mix(ground_radiance(met.xz), behind, fade);
+}
+
+// The radiance of the ground at x and z, interpolated linearly.
+fn ground_radiance(at: vec2f) -> vec3f {
+    let last = i32(display.ground_size) - 1;
+    let place = (0.5 * at / display.ground_half + 0.5) * f32(display.ground_size) - 0.5;
+    let low = clamp(vec2i(floor(place)), vec2i(0), vec2i(last));
+    let high = min(low + 1, vec2i(last));
+    let upper = clamp(place - vec2f(low), vec2f(0.0), vec2f(1.0));
+    let near = mix(ground_texel(low.x, low.y), ground_texel(high.x, low.y), upper.x);
+    let far = mix(ground_texel(low.x, high.y), ground_texel(high.x, high.y), upper.x);
+    return mix(near, far, upper.y);
+}
+
+fn ground_texel(x: i32, z: i32) -> vec3f {
+    return ground[u32(z) * display.ground_size + u32(x)].rgb;
+}
+
+// The radiance of the map in a direction, interpolated linearly.
+fn map_radiance(w: vec3f) -> vec3f {
     let size = vec2i(display.environment_size);
     let position = environment_coordinates(w) * vec2f(size) - 0.5;
     let corner = vec2i(floor(position));

@@ -3,6 +3,7 @@
 use bytemuck::NoUninit;
 use gpbrdf_core::figure::Colormap;
 
+use super::ground::Ground;
 use super::shade::EnvironmentBuffers;
 use crate::context::Context;
 use crate::error::{Error, Result};
@@ -153,6 +154,8 @@ pub(crate) struct Displayer {
     uniform: wgpu::Buffer,
     view: wgpu::Buffer,
     colours: wgpu::TextureView,
+    /// Bound where there is no ground.
+    no_ground: wgpu::Buffer,
 }
 
 /// The texture that a viewer shows: `rgba8unorm`, encoded, with straight alpha.
@@ -172,6 +175,34 @@ pub(crate) struct Shown<'a> {
     /// The map behind the object, black if there is none.
     pub(crate) map: &'a EnvironmentBuffers,
     pub(crate) has_map: bool,
+    /// The ground under the object, if there is one.
+    pub(crate) ground: Option<&'a GroundBuffer>,
+}
+
+/// A ground on the device.
+#[derive(Debug)]
+pub(crate) struct GroundBuffer {
+    texels: wgpu::Buffer,
+    size: u32,
+    half: f32,
+    height: f32,
+}
+
+impl GroundBuffer {
+    pub(crate) fn new(context: &Context, ground: &Ground) -> Result<Self> {
+        let radiance = ground.radiance();
+        let texels: Vec<[f32; 4]> = radiance.pixels().iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+        Ok(Self {
+            texels: context.buffer_of(
+                "ground",
+                bytemuck::cast_slice(&texels),
+                wgpu::BufferUsages::STORAGE,
+            )?,
+            size: gpu_types::to_u32(radiance.width()),
+            half: ground.half(),
+            height: ground.height(),
+        })
+    }
 }
 
 impl DisplayTexture {
@@ -198,6 +229,7 @@ impl Displayer {
             uniform: uniform(size_of::<gpu_types::Display>())?,
             view: uniform(size_of::<View>())?,
             colours: colour_maps(context)?,
+            no_ground: context.empty_buffer("no ground", 16, wgpu::BufferUsages::STORAGE)?,
         })
     }
 
@@ -223,6 +255,7 @@ impl Displayer {
                 (3, TextureView(&shown.map.view)),
                 (4, TextureView(&self.colours)),
                 (5, TextureView(&target.view)),
+                (6, shown.ground.map_or(&self.no_ground, |ground| &ground.texels).as_entire_binding()),
             ];
             let group = context.bind_group(&self.pipeline, resources);
             context.dispatch(&self.pipeline, &group, [size[0].div_ceil(8), size[1].div_ceil(8), 1]);
@@ -249,6 +282,10 @@ fn uniform_of(display: &Display, shown: &Shown<'_>, size: [u32; 2]) -> gpu_types
         exposure: display.exposure,
         limit: display.scale_end(),
         split,
+        ground_size: shown.ground.map_or(0, |ground| ground.size),
+        ground_half: shown.ground.map_or(1.0, |ground| ground.half),
+        ground_height: shown.ground.map_or(0.0, |ground| ground.height),
+        padding: 0.0,
     }
 }
 

@@ -4,6 +4,7 @@ pub(crate) mod camera;
 pub(crate) mod colour;
 pub(crate) mod display;
 pub(crate) mod gbuffer;
+pub(crate) mod ground;
 pub(crate) mod light;
 pub(crate) mod mesh;
 pub(crate) mod mesh_file;

@@ -6,8 +6,9 @@ use gpbrdf_core::judge::Image;
 
 use super::camera::Camera;
 use super::colour::luminance;
-use super::display::{Display, DisplayTexture, Displayer, Shown};
+use super::display::{Display, DisplayTexture, Displayer, GroundBuffer, Shown};
 use super::gbuffer::{GBuffer, Geometry, MeshBuffers, Rasterizer, view_of};
+use super::ground::Ground;
 use super::light::Light;
 use super::shade::{EnvironmentBuffers, Job, Materials, Shader, ShadingOptions};
 use crate::context::Context;
@@ -39,8 +40,8 @@ const SAMPLES_PER_PASS: u32 = 4;
 /// ```
 ///
 /// A change of the scene starts the picture anew; a change of the [`Display`] does not. The result depends on
-/// the number of samples and on nothing else, so pictures can be repeated. There are no shadows, and light is
-/// reflected once.
+/// the number of samples and on nothing else, so pictures can be repeated. Light is reflected once,
+/// and the only shadow is that on a [`Ground`].
 #[derive(Debug)]
 pub struct Renderer {
     context: Context,
@@ -53,6 +54,7 @@ pub struct Renderer {
     light: Light,
     environment: EnvironmentBuffers,
     black: EnvironmentBuffers,
+    ground: Option<GroundBuffer>,
     materials: Option<Materials>,
     options: ShadingOptions,
     view: wgpu::Buffer,
@@ -145,6 +147,7 @@ impl Renderer {
             camera: Camera::default(),
             environment: EnvironmentBuffers::new(context, &light)?,
             black: EnvironmentBuffers::new(context, &light)?,
+            ground: None,
             light,
             materials: None,
             options: ShadingOptions::default(),
@@ -248,13 +251,24 @@ impl Renderer {
         Ok(())
     }
 
+    /// Changes the ground that is seen behind the object, under an environment and with a perspective camera. It is
+    /// part of the background, so samples are kept.
+    ///
+    /// # Errors
+    /// Those of [`Context::guard`].
+    pub fn set_ground(&mut self, ground: Option<&Ground>) -> Result<()> {
+        self.ground = ground.map(|ground| GroundBuffer::new(&self.context, ground)).transpose()?;
+        Ok(())
+    }
+
     /// Changes the materials: a prediction, with its sigma in alpha, and a truth to compare it with, if there
     /// is one. The textures are shared, not copied; call this again after writing to them.
     ///
     /// # Errors
     /// Those of [`Context::guard`].
     pub fn set_materials(&mut self, truth: Option<&BrdfTexture>, prediction: &BrdfTexture) -> Result<()> {
-        self.materials = Some(Materials::new(&self.context, truth, prediction, self.options.exact_lookup)?);
+        let exact = self.options.exact_lookup;
+        self.materials = Some(Materials::new(&self.context, &self.shader, truth, prediction, exact)?);
         self.restart();
         Ok(())
     }
@@ -269,7 +283,8 @@ impl Renderer {
             && let Some(materials) = &self.materials
         {
             let (truth, prediction) = materials.textures();
-            self.materials = Some(Materials::new(&self.context, truth, prediction, options.exact_lookup)?);
+            let exact = options.exact_lookup;
+            self.materials = Some(Materials::new(&self.context, &self.shader, truth, prediction, exact)?);
         }
         if options != self.options {
             self.options = options;
@@ -359,6 +374,7 @@ impl Renderer {
             view: view_of(&self.camera, self.size(), [0.0; 2]),
             map: if has_map { &self.environment } else { &self.black },
             has_map,
+            ground: self.ground.as_ref(),
         };
         self.displayer.draw(&self.context, display, &shown, &self.frame.display)?;
         Ok(&self.frame.display.view)

@@ -24,14 +24,20 @@ pub(crate) struct HalfVectorShares {
 }
 
 impl HalfVectorShares {
-    /// Computes the shares of two materials together, so that one set of directions serves both.
+    /// The pipeline that computes shares.
+    pub(crate) fn pipeline(context: &Context, lookup: Lookup) -> Result<wgpu::ComputePipeline> {
+        context.compute_pipeline(WHAT, &shader::sampler(lookup), "half_vector_shares")
+    }
+
+    /// Computes the shares of two materials together, so that one set of directions serves both. The pipeline is that
+    /// of the lookup.
     pub(crate) fn new(
         context: &Context,
+        pipeline: &wgpu::ComputePipeline,
         truth: &BrdfTexture,
         prediction: &BrdfTexture,
         lookup: Lookup,
     ) -> Result<Self> {
-        let pipeline = context.compute_pipeline(WHAT, &shader::sampler(lookup), "half_vector_shares")?;
         let edges: Vec<f32> = (0..=N_THETA_H).map(edge).collect();
         let storage = wgpu::BufferUsages::STORAGE;
         let edges = context.buffer_of(WHAT, bytemuck::cast_slice(&edges), storage)?;
@@ -48,8 +54,8 @@ impl HalfVectorShares {
             if lookup == Lookup::Filtered {
                 resources.push((MATERIAL_SAMPLER, wgpu::BindingResource::Sampler(&sampler)));
             }
-            let group = context.bind_group(&pipeline, resources);
-            context.dispatch(&pipeline, &group, [VIEW_BINS, 1, 1]);
+            let group = context.bind_group(pipeline, resources);
+            context.dispatch(pipeline, &group, [VIEW_BINS, 1, 1]);
         })?;
         Ok(Self { edges, shares })
     }
@@ -76,7 +82,9 @@ mod tests {
         let black = BrdfTable::from_fn(|_| [0.0; 3]);
         let read = |table: &BrdfTable| {
             let texture = BrdfTexture::upload(context, table, None, Precision::Half).unwrap();
-            let found = HalfVectorShares::new(context, &texture, &texture, Lookup::Filtered).unwrap();
+            let pipeline = HalfVectorShares::pipeline(context, Lookup::Filtered).unwrap();
+            let found =
+                HalfVectorShares::new(context, &pipeline, &texture, &texture, Lookup::Filtered).unwrap();
             let bytes = context.read_buffer(&found.shares).unwrap();
             let shares: Vec<f32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
             assert_eq!(shares.len(), 64 * 91);

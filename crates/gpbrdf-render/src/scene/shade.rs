@@ -1,5 +1,7 @@
 //! Progressive shading of a G-buffer with two materials.
 
+use std::sync::OnceLock;
+
 use bytemuck::NoUninit;
 use gpbrdf_core::base::Raster;
 
@@ -156,12 +158,14 @@ pub(crate) struct Materials {
     single: bool,
     shares: HalfVectorShares,
     lookup: Lookup,
+    pipeline: wgpu::ComputePipeline,
 }
 
 impl Materials {
     /// A truth and a prediction, or one material for both.
     pub(crate) fn new(
         context: &Context,
+        shader: &Shader,
         truth: Option<&BrdfTexture>,
         prediction: &BrdfTexture,
         exact: bool,
@@ -169,8 +173,10 @@ impl Materials {
         let other = truth.unwrap_or(prediction);
         let filterable = prediction.is_filterable(context) && other.is_filterable(context);
         let lookup = if filterable && !exact { Lookup::Filtered } else { Lookup::Exact };
+        let Pipelines { shade, shares } = shader.pipelines(context, lookup)?;
         Ok(Self {
-            shares: HalfVectorShares::new(context, other, prediction, lookup)?,
+            shares: HalfVectorShares::new(context, shares, other, prediction, lookup)?,
+            pipeline: shade.clone(),
             truth: other.clone(),
             prediction: prediction.clone(),
             single: truth.is_none(),
@@ -183,11 +189,19 @@ impl Materials {
     }
 }
 
-/// The shading pipelines and the uniform they share.
+/// The pipelines of one kind of lookup.
+#[derive(Debug)]
+struct Pipelines {
+    shade: wgpu::ComputePipeline,
+    /// For [`HalfVectorShares`].
+    shares: wgpu::ComputePipeline,
+}
+
+/// The pipelines of both kinds of lookup, each made when it is first needed, and the uniform they share.
 #[derive(Debug)]
 pub(crate) struct Shader {
-    exact: wgpu::ComputePipeline,
-    filtered: wgpu::ComputePipeline,
+    exact: OnceLock<Pipelines>,
+    filtered: OnceLock<Pipelines>,
     uniform: wgpu::Buffer,
     sampler: wgpu::Sampler,
 }
@@ -209,8 +223,8 @@ pub(crate) struct Job<'a> {
 impl Shader {
     pub(crate) fn new(context: &Context) -> Result<Self> {
         Ok(Self {
-            exact: context.compute_pipeline(WHAT, &shader::shade(Lookup::Exact), "shade_pixels")?,
-            filtered: context.compute_pipeline(WHAT, &shader::shade(Lookup::Filtered), "shade_pixels")?,
+            exact: OnceLock::new(),
+            filtered: OnceLock::new(),
             uniform: context.empty_buffer(
                 "shading uniforms",
                 size_of::<Shade>() as u64,
@@ -220,12 +234,24 @@ impl Shader {
         })
     }
 
-    /// Adds samples to the sums. Each dispatch shades some rows, few enough for any driver.
-    pub(crate) fn add(&self, context: &Context, job: &Job<'_>) {
-        let pipeline = match job.materials.lookup {
+    fn pipelines(&self, context: &Context, lookup: Lookup) -> Result<&Pipelines> {
+        let known = match lookup {
             Lookup::Exact => &self.exact,
             Lookup::Filtered => &self.filtered,
         };
+        if let Some(pipelines) = known.get() {
+            return Ok(pipelines);
+        }
+        let made = Pipelines {
+            shade: context.compute_pipeline(WHAT, &shader::shade(lookup), "shade_pixels")?,
+            shares: HalfVectorShares::pipeline(context, lookup)?,
+        };
+        Ok(known.get_or_init(|| made))
+    }
+
+    /// Adds samples to the sums. Each dispatch shades some rows, few enough for any driver.
+    pub(crate) fn add(&self, context: &Context, job: &Job<'_>) {
+        let pipeline = &job.materials.pipeline;
         let group = self.bind(context, pipeline, job);
         let [width, height] = job.gbuffer.size();
         let budget = if context.is_hardware() { HARDWARE_BUDGET } else { SOFTWARE_BUDGET };

@@ -7,8 +7,8 @@ use gpbrdf_core::judge::{render_env, render_point};
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::twin::{TwinLight, shade_on_cpu};
 use gpbrdf_render::{
-    Background, BrdfTexture, Camera, Context, Display, Geometry, Light, LinearPicture, LinearPixel, Mesh,
-    Precision, Renderer, Sampling, ShadingOptions, Show, glam,
+    Background, BrdfTexture, Camera, Context, Display, Geometry, Ground, Light, LinearPicture, LinearPixel,
+    Mesh, Precision, Renderer, Sampling, ShadingOptions, Show, glam,
 };
 
 use crate::fixtures::{glossy, rippled, studio, upload};
@@ -20,6 +20,7 @@ crate::support::gpu_tests![
     a_white_furnace_returns_one,
     sigma_is_weighted_by_light_and_pictures_show_what_was_asked_for,
     pictures_repeat_and_impossible_sizes_are_refused,
+    the_ground_is_seen_where_rays_meet_it,
 ];
 
 /// The largest and the root of the mean square difference, relative to `scale`.
@@ -244,4 +245,54 @@ fn pictures_repeat_and_impossible_sizes_are_refused(context: &Context) {
     assert!(renderer.resize([1 << 20, 1]).is_err());
     assert_eq!(renderer.size(), [16, 16]);
     renderer.render_more(1).unwrap();
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places on the ground")]
+fn the_ground_is_seen_where_rays_meet_it(context: &Context) {
+    let environment = Environment::new(Raster::filled(16, 8, [0.6; 3])).unwrap();
+    let ground = Ground::new(&Geometry::Sphere, &environment, 400);
+    let camera = Camera::perspective(0.9, 0.5).orbited(0.4, 0.5);
+    let size = [90u32, 60];
+    let mut renderer = Renderer::new(context, size).unwrap();
+    renderer.set_camera(camera).unwrap();
+    renderer.set_light(Light::Environment((&environment).into())).unwrap();
+    renderer.set_materials(None, &upload(context, &BrdfTable::from_fn(|_| [0.1; 3]))).unwrap();
+    renderer.set_ground(Some(&ground)).unwrap();
+    renderer.set_shading(ShadingOptions { antialias: false, ..ShadingOptions::default() }).unwrap();
+    renderer.render_more(1).unwrap();
+    let shown = renderer.read_display(&Display::default()).unwrap();
+    let linear = renderer.read_linear().unwrap();
+    let axes = camera.world_from_view();
+    let (half_x, half_y) = camera.half_extents(1.5);
+    let radiance = ground.radiance();
+    let texels = radiance.width();
+    let mut compared = 0;
+    for (i, pixel) in shown.iter().enumerate().filter(|(i, _)| linear.raster().pixels()[*i].coverage == 0.0) {
+        let (column, row) = ((i % 90) as f32 + 0.5, (i / 90) as f32 + 0.5);
+        let across = axes.x_axis * (2.0 * column / 90.0 - 1.0) * half_x
+            + axes.y_axis * (1.0 - 2.0 * row / 60.0) * half_y;
+        let along = across - axes.z_axis;
+        let mut expected = 0.6;
+        if along.y < -1e-3 {
+            let met = camera.eye + (ground.height() - camera.eye.y) / along.y * along;
+            let share = met.x.hypot(met.z) / ground.half();
+            let t = ((share - 0.25) / 0.75).clamp(0.0, 1.0);
+            let fade = t * t * (3.0 - 2.0 * t);
+            let place = |x: f32| {
+                let at = (0.5 * x / ground.half() + 0.5) * texels as f32;
+                (at.max(0.0) as usize).min(texels - 1)
+            };
+            let value = radiance.at(place(met.x), place(met.z))[1];
+            expected = value + fade * (0.6 - value);
+        }
+        let found = (f32::from(pixel[1]) / 255.0).powf(2.2);
+        // The nearest texel stands for the interpolation.
+        assert!((found - expected).abs() < 0.02, "pixel {i}: {found}, not {expected}");
+        compared += 1;
+    }
+    assert!(compared > 2000, "{compared}");
+    // Without a ground there is the map.
+    renderer.set_ground(None).unwrap();
+    let plain = renderer.read_display(&Display::default()).unwrap();
+    assert!(plain.iter().zip(&shown).any(|(a, b)| a != b));
 }

@@ -125,7 +125,7 @@ impl Viewer {
             document.renew(Arc::clone(&source));
         }
         let count = source.samples().map_or(0, gpbrdf_core::SampleSet::len);
-        self.context.messages.note(format!("{}: read again, {count} samples", source.name));
+        self.context.messages.success(format!("{}: read again, {count} samples", source.name));
     }
 
     /// Opens a built-in material.
@@ -158,7 +158,7 @@ impl Viewer {
             self.remove(id);
         }
         let recent = std::mem::take(&mut self.settings.recent);
-        self.settings = Settings { recent, ..session.settings };
+        self.settings = Settings { recent, hint: self.settings.hint, ..session.settings };
         self.new_zoom = Some(self.settings.zoom);
         self.restore_panes();
         for saved in session.documents {
@@ -201,7 +201,7 @@ impl Viewer {
         match Session::new(&self.context.documents, self.settings()).write(path) {
             Ok(()) => {
                 self.settings.remember(path);
-                self.context.messages.note(format!("saved session \"{}\"", path.display()));
+                self.context.messages.success(format!("saved session \"{}\"", path.display()));
             }
             Err(error) => self.context.messages.error(format!("{error:#}")),
         }

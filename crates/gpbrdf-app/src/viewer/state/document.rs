@@ -10,7 +10,7 @@ use gpbrdf_core::{
     Brdf, BrdfTable, Content, FitReport, HalfDiff, Hyper, Model, Progress, Rgb, SampleSet, Source,
 };
 
-use crate::job::{ModelSpec, Stage};
+use crate::job::{ModelSpec, Stage, remaining};
 use crate::viewer::work::planner::Planned;
 
 /// Names a document for as long as the program runs.
@@ -54,6 +54,36 @@ pub(crate) enum Work {
     Failed(String),
 }
 
+impl Work {
+    /// What people read: the stage, the share that is done and the time that is left, once both are known.
+    pub(crate) fn text(&self) -> Option<String> {
+        match self {
+            Self::Idle => None,
+            Self::Waiting => Some("Waiting".to_owned()),
+            Self::Cancelled => Some("Cancelled".to_owned()),
+            Self::Failed(message) => Some(format!("Failed: {message}")),
+            Self::Running { stage, since, begun, progress } => {
+                let seconds = since.elapsed().as_secs_f64();
+                let mut text = stage.label().to_owned();
+                let left = progress.share.and_then(|share| remaining(begun.elapsed(), share));
+                match progress.share {
+                    Some(share) => text.push_str(&format!(", {:.0} %", 100.0 * share)),
+                    None if progress.evaluations > 0 => {
+                        text.push_str(&format!(", {} evaluations", progress.evaluations));
+                    }
+                    None => {}
+                }
+                match left {
+                    Some(left) => text.push_str(&format!(", {left}")),
+                    None if seconds > 1.0 => text.push_str(&format!(", {seconds:.0} s")),
+                    None => {}
+                }
+                Some(text)
+            }
+        }
+    }
+}
+
 /// An open material.
 #[derive(Debug)]
 pub(crate) struct Document {
@@ -67,6 +97,8 @@ pub(crate) struct Document {
     pub(crate) spec: ModelSpec,
     /// The model that was last requested from the fitter.
     pub(crate) requested: Option<ModelSpec>,
+    /// The number of that request.
+    pub(crate) request: u64,
     pub(crate) fitted: Option<Fitted>,
     /// The hyper-parameters that the last search found: the defaults of the sliders.
     pub(crate) optimum: Option<Hyper>,
@@ -100,6 +132,7 @@ impl Document {
             truth: None,
             spec: ModelSpec::interactive(),
             requested: None,
+            request: 0,
             fitted: None,
             optimum: None,
             work: Work::Idle,
@@ -159,6 +192,11 @@ impl Document {
     pub(crate) fn renew(&mut self, source: Arc<Source>) {
         self.source = source;
         (self.truth, self.requested) = (None, None);
+    }
+
+    /// Has the model that is wanted fitted again, after an error or because the user has cancelled it.
+    pub(crate) fn retry(&mut self) {
+        self.requested = None;
     }
 
     /// Lets the search find the hyper-parameters again.

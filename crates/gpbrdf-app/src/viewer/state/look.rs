@@ -185,6 +185,11 @@ impl Default for SphereLight {
 }
 
 impl SphereLight {
+    /// Whether another light differs in its exposure only.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        Self { exposure: other.exposure, ..*self } == *other
+    }
+
     /// Moves the point light to a position over the disc, or to the rim where the position is outside.
     pub(crate) fn place(&mut self, [x, y]: [f64; 2]) {
         let scale = x.hypot(y).max(1.0);
@@ -200,7 +205,7 @@ impl SphereLight {
 /// The object that is lit.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Shape {
-    /// The sphere, which the processor renders.
+    /// The unit sphere.
     #[default]
     Sphere,
     Knot,

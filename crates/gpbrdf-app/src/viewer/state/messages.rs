@@ -1,4 +1,4 @@
-//! Messages for the user: errors stay until they are dismissed.
+//! Messages for the user: errors and notes stay until they are dismissed, successes for a moment.
 
 use std::path::Path;
 
@@ -8,12 +8,23 @@ pub(crate) fn naming(path: &Path, error: &dyn std::fmt::Display) -> String {
     if text.contains(&name) { text } else { format!("\"{name}\": {text}") }
 }
 
+/// What a message says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Error,
+    /// Something worth knowing, such as how a file was read.
+    Note,
+    /// Something that was wanted is done.
+    Success,
+}
+
 /// One message.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Message {
-    /// Whether it reports a failure, not a success.
-    pub(crate) is_error: bool,
+    pub(crate) kind: Kind,
     pub(crate) text: String,
+    /// The time, in seconds, at which it was first shown.
+    since: Option<f64>,
 }
 
 /// Messages, the oldest first.
@@ -22,31 +33,49 @@ pub(crate) struct Messages {
     list: Vec<Message>,
 }
 
-/// The oldest notes are dropped where there are more than this.
+/// The oldest notes and successes are dropped where there are more than this.
 const NOTES: usize = 3;
 
 impl Messages {
     /// Reports a failure.
     pub(crate) fn error(&mut self, message: impl Into<String>) {
-        self.push(true, message.into());
+        self.push(Kind::Error, message.into());
+    }
+
+    /// Says what is worth knowing.
+    pub(crate) fn note(&mut self, message: impl Into<String>) {
+        self.push(Kind::Note, message.into());
     }
 
     /// Reports a success.
-    pub(crate) fn note(&mut self, message: impl Into<String>) {
-        self.push(false, message.into());
+    pub(crate) fn success(&mut self, message: impl Into<String>) {
+        self.push(Kind::Success, message.into());
     }
 
-    fn push(&mut self, is_error: bool, text: String) {
+    fn push(&mut self, kind: Kind, text: String) {
         if !self.list.iter().any(|known| known.text == text) {
-            self.list.push(Message { is_error, text });
+            self.list.push(Message { kind, text, since: None });
         }
         // Notes make room for newer ones; errors stay until they are read.
-        let notes = self.list.iter().filter(|m| !m.is_error).count();
+        let notes = self.list.iter().filter(|m| m.kind != Kind::Error).count();
         if notes > NOTES
-            && let Some(oldest) = self.list.iter().position(|m| !m.is_error)
+            && let Some(oldest) = self.list.iter().position(|m| m.kind != Kind::Error)
         {
             self.list.remove(oldest);
         }
+    }
+
+    /// Drops the successes that have been shown for so many seconds.
+    pub(crate) fn expire(&mut self, now: f64, seconds: f64) {
+        self.list.retain_mut(|message| {
+            let since = *message.since.get_or_insert(now);
+            message.kind != Kind::Success || now - since < seconds
+        });
+    }
+
+    /// Drops all of them.
+    pub(crate) fn clear(&mut self) {
+        self.list.clear();
     }
 
     /// The messages, the oldest first.
@@ -78,9 +107,23 @@ mod tests {
             messages.note(format!("note {i}"));
         }
         messages.error("error 3");
-        let count = |error: bool| messages.list.iter().filter(|m| m.is_error == error).count();
+        let count = |error: bool| messages.list.iter().filter(|m| (m.kind == Kind::Error) == error).count();
         assert_eq!((count(true), count(false)), (20, NOTES));
         assert_eq!(messages.list[0].text, "error 0");
         assert!(messages.list.iter().any(|m| m.text == "note 19"));
+    }
+
+    #[test]
+    fn successes_go_and_all_else_stays() {
+        let mut messages = Messages::default();
+        messages.success("written");
+        messages.note("odd");
+        messages.error("broken");
+        messages.expire(100.0, 8.0);
+        messages.expire(107.0, 8.0);
+        assert_eq!(messages.list.len(), 3);
+        messages.expire(108.5, 8.0);
+        let left: Vec<&str> = messages.iter().map(|message| message.text.as_str()).collect();
+        assert_eq!(left, ["odd", "broken"]);
     }
 }

@@ -27,6 +27,8 @@ pub struct Settings {
     pub(crate) tab: Option<String>,
     /// Whether open files of measurements are read again when they change.
     pub(crate) watch: bool,
+    /// Whether the hint of the first run is shown.
+    pub(crate) hint: bool,
     /// What each pane remembers, by the name of the pane.
     pub(crate) panes: BTreeMap<String, serde_json::Value>,
     /// What the user should know about how the settings were read.
@@ -44,6 +46,7 @@ impl Default for Settings {
             view: None,
             tab: None,
             watch: true,
+            hint: true,
             panes: BTreeMap::new(),
             notices: Vec::new(),
         }

@@ -24,7 +24,10 @@ impl Menu<'_> {
             ui.menu_button("File", |ui| self.file_ui(ui, &mut chosen));
             ui.menu_button("Materials", |ui| materials_ui(ui, &mut chosen));
             ui.menu_button("View", |ui| self.view_ui(ui, &mut chosen));
-            ui.menu_button("Help", |ui| self.item_ui(ui, "Shortcuts", Action::Help, &mut chosen));
+            ui.menu_button("Help", |ui| {
+                self.item_ui(ui, "First steps", Action::Hint, &mut chosen);
+                self.item_ui(ui, "Shortcuts", Action::Help, &mut chosen);
+            });
             ui.add_space(12.0);
             self.views_ui(ui, &mut chosen);
         });

@@ -1,5 +1,6 @@
 //! What is drawn. Functions named `*_ui` draw and never wait.
 
+pub(crate) mod hint;
 pub(crate) mod layout;
 pub(crate) mod menu;
 pub(crate) mod messages;
@@ -8,5 +9,7 @@ pub(crate) mod pane;
 pub(crate) mod panes;
 pub(crate) mod shortcuts;
 pub(crate) mod status;
+pub(crate) mod theme;
+pub(crate) mod ticks;
 pub(crate) mod widgets;
 pub(crate) mod windows;

@@ -5,6 +5,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{Context, KeyboardShortcut, Ui};
@@ -184,7 +185,6 @@ pub(crate) enum Order {
 }
 
 /// What panes share.
-#[derive(Debug)]
 pub(crate) struct PaneContext {
     pub(crate) documents: Documents,
     pub(crate) messages: Messages,
@@ -192,18 +192,21 @@ pub(crate) struct PaneContext {
     pub(crate) orders: Vec<Order>,
     /// Where reports about written files go.
     pub(crate) saved: Outbox<Saved>,
+    /// The window.
+    pub(crate) egui: Context,
     /// Whether views go back to what they show at first, in this frame and in the next one.
     pub(crate) reset_views: bool,
     pub(crate) reset_next: bool,
 }
 
 impl PaneContext {
-    pub(crate) fn new(saved: Outbox<Saved>) -> Self {
+    pub(crate) fn new(egui: Context, saved: Outbox<Saved>) -> Self {
         Self {
             documents: Documents::default(),
             messages: Messages::default(),
             orders: Vec::new(),
             saved,
+            egui,
             reset_views: false,
             reset_next: false,
         }
@@ -221,6 +224,8 @@ pub(crate) struct Start {
     pub(crate) wake: Waker,
     /// A test of whether the fitter works; slower work waits meanwhile.
     pub(crate) busy: Arc<dyn Fn() -> bool + Send + Sync>,
+    /// Whether the first picture of an object is awaited, for which slower work makes room.
+    pub(crate) awaited: Arc<AtomicBool>,
 }
 
 impl Start {

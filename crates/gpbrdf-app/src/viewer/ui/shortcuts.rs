@@ -15,6 +15,8 @@ pub(crate) enum Action {
     Quit,
     TogglePanels,
     Help,
+    /// Show the hint of the first run.
+    Hint,
     /// Close windows, or else cancel the work on the selected material.
     Cancel,
     ResetViews,

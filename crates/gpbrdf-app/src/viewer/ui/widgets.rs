@@ -3,7 +3,8 @@
 use std::ops::RangeInclusive;
 
 use eframe::egui::containers::menu::{MenuButton, MenuConfig};
-use eframe::egui::{self, ComboBox, Response, RichText, Slider, TextureHandle, Ui};
+use eframe::egui::text::{LayoutJob, TextFormat};
+use eframe::egui::{self, Align, Color32, ComboBox, FontId, Response, RichText, Slider, TextureHandle, Ui};
 use gpbrdf_core::figure::Colormap;
 
 use crate::viewer::work::slices::colour;
@@ -80,7 +81,7 @@ pub(crate) fn row_ui<R>(ui: &mut Ui, label: &str, content: impl FnOnce(&mut Ui) 
             egui::Layout::left_to_right(egui::Align::Center),
             |ui| {
                 ui.set_min_width(LABEL_WIDTH);
-                ui.add(egui::Label::new(label).truncate());
+                ui.add(egui::Label::new(subscripted(label)).truncate());
             },
         );
         ui.name_inputs(label, content)
@@ -115,7 +116,7 @@ pub(crate) fn tool_ui(ui: &mut Ui, number: Number<'_>, width: f32, value: &mut f
     let size = egui::vec2(width, ui.spacing().interact_size.y);
     let layout = egui::Layout::left_to_right(egui::Align::Center);
     ui.allocate_ui_with_layout(size, layout, |ui| {
-        ui.label(number.label);
+        ui.label(subscripted(number.label));
         number.slider_ui(ui, value)
     })
     .inner
@@ -137,7 +138,7 @@ pub(crate) fn segments_ui<T: Copy + PartialEq>(
     let before = *value;
     let gap = std::mem::replace(&mut ui.spacing_mut().item_spacing.x, 2.0);
     for &option in all {
-        ui.selectable_value(value, option, name(option));
+        ui.selectable_value(value, option, subscripted(name(option)));
     }
     ui.spacing_mut().item_spacing.x = gap;
     *value != before
@@ -157,6 +158,31 @@ pub(crate) fn put_texture(
         }
         None => ctx.load_texture(name, image, egui::TextureOptions::LINEAR),
     }
+}
+
+/// A text in which the letters h, d, i and o after a theta or a phi are subscripts.
+pub(crate) fn subscripted(text: &str) -> LayoutJob {
+    let mut job = LayoutJob::default();
+    let whole = |size: f32, valign| TextFormat { font_id: FontId::proportional(size), valign, ..plain() };
+    let mut rest = text;
+    while let Some(at) = rest.find(['θ', 'φ']) {
+        let letter = at + 'θ'.len_utf8();
+        job.append(&rest[..letter], 0.0, whole(14.0, Align::BOTTOM));
+        rest = &rest[letter..];
+        if rest.starts_with(['h', 'd', 'i', 'o']) {
+            job.append(&rest[..1], 0.0, whole(9.5, Align::BOTTOM));
+            rest = &rest[1..];
+        }
+    }
+    if !rest.is_empty() {
+        job.append(rest, 0.0, whole(14.0, Align::BOTTOM));
+    }
+    job
+}
+
+/// Text in the colour of the widget that shows it.
+fn plain() -> TextFormat {
+    TextFormat { color: Color32::PLACEHOLDER, ..TextFormat::default() }
 }
 
 /// The heading of a part of a panel.
@@ -207,7 +233,23 @@ pub(crate) fn narrow(x: f64) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::short;
+    use eframe::epaint::text::ByteRangeExt;
+
+    use super::*;
+
+    #[test]
+    fn only_letters_after_an_angle_are_subscripts() {
+        let job = subscripted("× cos θi at φd, heading");
+        assert_eq!(job.text, "× cos θi at φd, heading");
+        let small: Vec<&str> = job
+            .sections
+            .iter()
+            .filter(|section| section.format.font_id.size < 12.0)
+            .map(|section| &job.text[section.byte_range.as_usize()])
+            .collect();
+        assert_eq!(small, ["i", "d"]);
+        assert_eq!(subscripted("").text, "");
+    }
 
     #[test]
     fn numbers_keep_four_digits() {

@@ -4,15 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use eframe::egui::Context;
+use eframe::egui::{ColorImage, Context, Rect};
 use gpbrdf_core::Rgb;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::figure::{Picture, Slice, slice_figure, sphere_figure};
+use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, Slice, panel_figure, slice_figure};
 use gpbrdf_core::formats::write_image_exr;
+use gpbrdf_render::LinearPixel;
 
 use super::outbox::{Outbox, in_background};
+use super::scene::Whole;
 use super::slices::Truth;
-use super::spheres::SphereImages;
 use crate::job::{expected_errors, plan_csv};
 use crate::viewer::state::document::Document;
 use crate::viewer::state::look::SliceLook;
@@ -78,22 +79,75 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
     });
 }
 
-/// Writes spheres as they are shown: a figure, and linear pictures beside it.
-pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &Outbox<Saved>) {
-    let (truth, prediction) = (images.linear_truth.clone(), images.linear_mean.clone());
-    let (name, path, psnr) = (name.to_owned(), path.with_extension("png"), images.psnr);
+/// Writes the lit object as it is shown: a figure, and linear pictures beside it.
+pub(crate) fn picture(name: &str, whole: &Whole, path: &Path, outbox: &Outbox<Saved>) {
+    let (name, whole, path) = (name.to_owned(), whole.clone(), path.with_extension("png"));
     write(outbox, move || {
-        let picture = sphere_figure(&name, truth.as_ref(), &prediction, psnr)?;
+        let high = f64::from(whole.limits.difference);
+        let scale = Scale { map: Colormap::Diverging, low: -high, high };
+        let shown = [
+            ("truth", &whole.truth, None),
+            ("prediction", &Some(whole.prediction), None),
+            ("difference", &whole.difference, Some(scale)),
+        ];
+        let panels = shown.into_iter().filter_map(|(caption, image, scale)| {
+            Some(Panel { picture: picture_of(image.as_ref()?), caption, scale })
+        });
+        let note = match &whole.difference {
+            Some(_) => "difference: exposure x (prediction - truth), linear, mean of R, G, B",
+            None => "",
+        };
+        let picture = panel_figure(&name, &panels.collect::<Vec<_>>(), note);
         let mut files = vec![png_file(&path, &picture)?];
-        let linear = truth.iter().map(|image| ("truth", image)).chain([("prediction", &prediction)]);
-        for (which, image) in linear {
-            let raster = image.raster();
-            let pixels: Vec<Rgb> = raster.pixels().iter().map(|p| p.map(f64::from)).collect();
+        let raster = whole.linear.raster();
+        let mut linear = |which: &str, value: fn(&LinearPixel) -> [f32; 3]| -> Result<()> {
+            let pixels: Vec<Rgb> = raster.pixels().iter().map(|p| value(p).map(f64::from)).collect();
             let target = beside(&path, &format!("-{which}.exr"));
             files.push(exr_file(&target, [raster.width(), raster.height()], &pixels)?);
+            Ok(())
+        };
+        if whole.truth.is_some() {
+            linear("truth", |pixel| pixel.truth)?;
         }
+        linear("prediction", |pixel| pixel.prediction)?;
         AtomicFile::commit_all(files)?;
         Ok(format!("wrote \"{}\" and the linear pictures beside it", path.display()))
+    });
+}
+
+/// What the window shows, for a file.
+fn picture_of(image: &ColorImage) -> Picture {
+    let [width, height] = image.size;
+    Picture::from_fn(width, height, |x, y| {
+        let [r, g, b, _] = image.pixels[y * width + x].to_array();
+        [r, g, b]
+    })
+}
+
+/// Writes curves as a table, and a picture of this part of the window beside it.
+pub(crate) fn curves(ctx: &Context, text: String, part: Option<Rect>, path: &Path, outbox: &Outbox<Saved>) {
+    let path = path.with_extension("csv");
+    let table = move |path: &Path| -> Result<AtomicFile> {
+        let mut file = AtomicFile::create(path)?;
+        std::io::Write::write_all(&mut file, text.as_bytes())
+            .with_context(|| format!("cannot write \"{}\"", path.display()))?;
+        Ok(file)
+    };
+    let Some(part) = part else {
+        write(outbox, move || {
+            table(&path)?.commit()?;
+            Ok(format!("wrote \"{}\"", path.display()))
+        });
+        return;
+    };
+    let (outbox, scale) = (outbox.clone(), ctx.pixels_per_point());
+    ctx.request_screenshot(move |image| {
+        write(&outbox, move || {
+            let picture = picture_of(&image.region(&part, Some(scale)));
+            let files = vec![table(&path)?, png_file(&path.with_extension("png"), &picture)?];
+            AtomicFile::commit_all(files)?;
+            Ok(format!("wrote \"{}\" and its picture beside it", path.display()))
+        });
     });
 }
 
@@ -140,10 +194,7 @@ pub(crate) fn screenshot(ctx: &Context, folder: Option<PathBuf>, outbox: &Outbox
             let folder =
                 folder.map_or_else(std::env::current_dir, Ok).context("cannot find the current folder")?;
             let path = free_name(&folder, "gpbrdf-screenshot")?;
-            let picture = Picture::from_fn(width, height, |x, y| {
-                let [r, g, b, _] = image.pixels[y * width + x].to_array();
-                [r, g, b]
-            });
+            let picture = picture_of(&image);
             // The inverse of the curve of IEC 61966-2-1.
             let linear = |x: u8| {
                 let x = f64::from(x) / 255.0;

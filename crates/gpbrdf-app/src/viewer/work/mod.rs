@@ -11,5 +11,5 @@ pub(crate) mod planner;
 pub(crate) mod quality;
 pub(crate) mod scene;
 pub(crate) mod slices;
-pub(crate) mod spheres;
+pub(crate) mod sphere_metrics;
 pub(crate) mod watcher;

@@ -1,11 +1,11 @@
 //! How close the picture of an object's prediction is to that of its truth, measured on a thread of its own
-//! while the pictures get smoother.
+//! while the pictures get smoother. Both are exposed as in the image metrics, whatever the exposure on the screen.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use gpbrdf_core::judge::{psnr, ssim};
+use gpbrdf_core::judge::{exposure_of, psnr, ssim};
 use gpbrdf_render::LinearPicture;
 
 use super::mailbox::{Mailbox, Sender};
@@ -18,8 +18,7 @@ pub(crate) struct Measured {
     pub(crate) document: DocumentId,
     pub(crate) picture: u64,
     pub(crate) samples: u32,
-    pub(crate) exposure: f64,
-    pub(crate) linear: LinearPicture,
+    pub(crate) linear: Arc<LinearPicture>,
 }
 
 /// How close truth and prediction are.
@@ -81,11 +80,12 @@ impl Measurer {
 
 fn measure(measured: &Measured) -> Option<Quality> {
     let (truth, prediction) = measured.linear.images().ok()?;
+    let exposure = exposure_of(&truth);
     Some(Quality {
         document: measured.document,
         picture: measured.picture,
         samples: measured.samples,
-        psnr: psnr(&truth, &prediction, measured.exposure).ok()?,
-        ssim: ssim(&truth, &prediction, measured.exposure).ok()?,
+        psnr: psnr(&truth, &prediction, exposure).ok()?,
+        ssim: ssim(&truth, &prediction, exposure).ok()?,
     })
 }

@@ -1,19 +1,23 @@
-//! Objects lit on a graphics device, progressively, by a thread that serves the newest request.
+//! Objects lit on a graphics device, progressively, by a thread that serves the newest request. A small picture of
+//! many samples comes first, then the whole one once it is smooth enough to take its place.
 //!
 //! It uses a second device. On the window's device, long dispatches would delay presentation, and wgpu cannot
 //! configure a surface while another thread submits work.
 
+use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 use std::time::Duration;
 
 use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
 use gpbrdf_core::base::Raster;
+use gpbrdf_core::figure::round_limit;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
-    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light,
-    Mesh, Precision, Renderer, Show, read_mesh,
+    AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Ground,
+    Light, LinearPicture, LinearPixel, Mesh, Precision, Renderer, Show, ToneCurve, read_mesh,
 };
+use rayon::prelude::*;
 
 use super::mailbox::{Mailbox, Sender};
 use super::outbox::Outbox;
@@ -44,7 +48,6 @@ pub(crate) struct SceneKey {
     pub(crate) orbit: Orbit,
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
-    pub(crate) exposure: f32,
     /// Pixels of one picture; there are two of this size side by side.
     pub(crate) size: [u32; 2],
     pub(crate) shown: SphereShown,
@@ -52,6 +55,32 @@ pub(crate) struct SceneKey {
 }
 
 impl SceneKey {
+    /// Whether another scene has the same exposure: the eye may be elsewhere, and the model another one.
+    fn has_exposure_of(&self, other: &Self) -> bool {
+        self.document == other.document
+            && self.truth_is_tabulated == other.truth_is_tabulated
+            && self.shape == other.shape
+            && self.environment == other.environment
+            && self.light.is_like(&other.light)
+    }
+
+    /// The factor of the exposure that the user has set.
+    fn stops(&self) -> f32 {
+        to_f32(self.light.exposure.exp2())
+    }
+
+    /// The camera. The sphere looks the same from everywhere; its eye stays before the light, a little above the
+    /// ground.
+    fn camera(&self) -> Camera {
+        let (orbit, camera) = (self.orbit, Camera::perspective(0.6, 0.82));
+        let camera = if self.shape == Shape::Sphere {
+            camera.orbited(0.0, SPHERE_ELEVATION)
+        } else {
+            camera.orbited(orbit.azimuth, orbit.elevation)
+        };
+        camera.zoomed(orbit.zoom)
+    }
+
     /// Whether truth and prediction are two whole pictures.
     fn is_pair(&self) -> bool {
         self.truth_is_tabulated && self.shown == SphereShown::SideBySide
@@ -70,9 +99,19 @@ impl SceneKey {
     }
 }
 
+/// What the thread is told.
+#[derive(Clone, Debug)]
+pub(crate) enum SceneWork {
+    /// Open the device and compile the shaders, which takes as long as a fit.
+    Prepare,
+    Picture(Box<SceneRequest>),
+}
+
 /// A picture to make.
 #[derive(Clone, Debug)]
 pub(crate) struct SceneRequest {
+    /// A number that no earlier request had.
+    pub(crate) number: u64,
     pub(crate) key: SceneKey,
     pub(crate) truth: Option<Arc<BrdfTable>>,
     pub(crate) mean: Arc<BrdfTable>,
@@ -85,6 +124,8 @@ pub(crate) struct SceneRequest {
 pub(crate) enum SceneResult {
     Picture(Box<SceneImage>),
     Quality(Quality),
+    /// The whole picture once it is smooth, for files.
+    Whole(Box<Whole>),
     /// The object cannot be shown: its file is broken or the device refuses.
     Failed(String),
     /// The device was lost, and another one is opened.
@@ -95,18 +136,57 @@ pub(crate) enum SceneResult {
 #[derive(Clone, Debug)]
 pub(crate) struct SceneImage {
     pub(crate) document: DocumentId,
+    /// The number of the request.
+    pub(crate) request: u64,
     /// A number that stays while this picture gets smoother, and that no other picture has.
     pub(crate) picture: u64,
     pub(crate) image: ColorImage,
     /// The picture of the prediction, where `image` shows the truth alone.
     pub(crate) beside: Option<ColorImage>,
-    pub(crate) samples: u32,
+    /// Samples of each pixel of the window's picture; `None` for a small picture that stands for it.
+    pub(crate) samples: Option<u32>,
+    /// Whether no smoother one follows.
+    pub(crate) is_last: bool,
+    pub(crate) limits: Limits,
 }
+
+/// The ends of the scales of false colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Limits {
+    pub(crate) difference: f32,
+    pub(crate) sigma: f32,
+}
+
+/// A smooth picture, as shown and as numbers.
+#[derive(Clone, Debug)]
+pub(crate) struct Whole {
+    pub(crate) document: DocumentId,
+    /// The number of the picture.
+    pub(crate) picture: u64,
+    pub(crate) truth: Option<ColorImage>,
+    pub(crate) prediction: ColorImage,
+    pub(crate) difference: Option<ColorImage>,
+    pub(crate) limits: Limits,
+    pub(crate) linear: Arc<LinearPicture>,
+}
+
+/// The most pixels of a picture where the processor does the device's work; the window enlarges it.
+const SOFTWARE_PIXELS: f64 = 320_000.0;
+
+/// How high the eye is that sees the sphere, radians.
+const SPHERE_ELEVATION: f32 = 0.2;
+
+/// Directions of the light on the ground: in the small picture, and in the whole one.
+const GROUND_AT_FIRST: usize = 48;
+const GROUND_DIRECTIONS: usize = 320;
 
 /// Samples of a smooth picture.
 const SAMPLES: u32 = 192;
-/// The value at the end of the scales of false colours.
-pub(crate) const LIMIT: f32 = 0.1;
+/// Samples of a picture that replaces the small one.
+const FIRST_SAMPLES: u32 = 16;
+/// The small picture has this share of the pixels along each side, and so many samples.
+const SMALL: u32 = 3;
+const SMALL_SAMPLES: u32 = 24;
 
 /// Why there is no picture, with a message.
 enum Stop {
@@ -122,16 +202,38 @@ impl From<gpbrdf_render::Error> for Stop {
     }
 }
 
-/// Starts the thread that renders, on `context` or else on a device that it opens. Beyond the first samples
+/// Starts the thread that renders, on `context` or else on a device that it opens. Beyond the first pictures
 /// it waits while the fitter is `busy`.
 pub(crate) fn spawn(
     outbox: Outbox<SceneResult>,
     context: Option<Context>,
-    busy: impl Fn() -> bool + Send + 'static,
-) -> std::io::Result<Sender<SceneRequest>> {
+    busy: impl Fn() -> bool + Send + Sync + 'static,
+) -> std::io::Result<Sender<SceneWork>> {
+    // The shared pool may be busy with a fit for seconds.
+    let pool = rayon::ThreadPoolBuilder::new().build().map_err(std::io::Error::other)?;
     let measurer = Measurer::spawn(outbox.map(SceneResult::Quality))?;
-    let mut scene = Scene { context, renderer: None, materials: None, last: None, picture: 0, measurer };
-    Mailbox::spawn("scene", move |request: SceneRequest, stale| {
+    let mut scene = Scene {
+        context,
+        renderer: None,
+        materials: None,
+        last: None,
+        geometry: Geometry::Sphere,
+        turned: None,
+        ground: 0,
+        picture: 0,
+        exposure: None,
+        limits: Limits::default(),
+        handed: 0,
+        measurer,
+    };
+    let mut serve = move |work: SceneWork, stale: &(dyn Fn() -> bool + Sync)| {
+        let SceneWork::Picture(request) = work else {
+            // What goes wrong is found again, and told, with the first picture.
+            if scene.warm_up().is_err() {
+                scene.clear();
+            }
+            return;
+        };
         let mut result = scene.render(&request, &outbox, stale, &busy);
         if let Err(Stop::Lost(message)) = &result {
             let name = scene.context.as_ref().map_or_else(String::new, |c| c.info().name.clone());
@@ -144,7 +246,8 @@ pub(crate) fn spawn(
             scene.clear();
             outbox.send(SceneResult::Failed(message));
         }
-    })
+    };
+    Mailbox::spawn("scene", move |work: SceneWork, stale| pool.install(|| serve(work, stale)))
 }
 
 struct Scene {
@@ -152,7 +255,17 @@ struct Scene {
     renderer: Option<Renderer>,
     materials: Option<Materials>,
     last: Option<SceneKey>,
+    geometry: Geometry,
+    /// The environment as it is turned; `None` under a point light.
+    turned: Option<Environment>,
+    /// Directions of the ground's light.
+    ground: usize,
     picture: u64,
+    /// The exposure that was found for a scene, which it keeps while the eye moves.
+    exposure: Option<(SceneKey, f32)>,
+    limits: Limits,
+    /// The smooth picture that was last handed out.
+    handed: u64,
     measurer: Measurer,
 }
 
@@ -176,6 +289,41 @@ impl Scene {
         self.context = None;
     }
 
+    /// The context and the renderer, which are opened and made where there are none.
+    fn renderer(&mut self, size: [u32; 2]) -> Result<(Context, &mut Renderer), Stop> {
+        let context = match &self.context {
+            Some(context) => context.clone(),
+            None => self.context.insert(Context::open(AdapterChoice::Any)?).clone(),
+        };
+        let renderer = match &mut self.renderer {
+            Some(renderer) => renderer,
+            none => none.insert(Renderer::new(&context, size)?),
+        };
+        Ok((context, renderer))
+    }
+
+    /// Columns and rows of the picture of a request.
+    fn size_of(&self, key: &SceneKey) -> [u32; 2] {
+        let pixels: f64 = key.size.map(f64::from).iter().product();
+        if pixels <= SOFTWARE_PIXELS || self.context.as_ref().is_none_or(Context::is_hardware) {
+            return key.size;
+        }
+        let factor = (SOFTWARE_PIXELS / pixels).sqrt();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "smaller than it was")]
+        key.size.map(|side| (f64::from(side) * factor).max(16.0) as u32)
+    }
+
+    /// Takes a picture of a few pixels, for which drivers compile all shaders.
+    fn warm_up(&mut self) -> Result<(), Stop> {
+        let (context, renderer) = self.renderer([16, 16])?;
+        let black = BrdfTexture::empty(&context, Precision::Half)?;
+        renderer.set_materials(Some(&black), &black)?;
+        renderer.set_light(Light::Environment((&Environment::studio()).into()))?;
+        renderer.render_more(1)?;
+        renderer.read_display(&Display::default())?;
+        Ok(())
+    }
+
     fn render(
         &mut self,
         request: &SceneRequest,
@@ -185,82 +333,161 @@ impl Scene {
     ) -> Result<(), Stop> {
         let key = &request.key;
         self.prepare(request)?;
+        let size = self.size_of(key);
         let Some(renderer) = &mut self.renderer else { return Ok(()) };
-        let display = Display {
-            exposure: key.exposure.max(1e-6),
-            background: if key.light.point { Background::Black } else { Background::Environment },
-            limit: Some(LIMIT),
-            ..Display::default()
-        };
-        let shown = |renderer: &mut Renderer, show: Show| -> Result<ColorImage, Stop> {
-            let pixels = renderer.read_display(&Display { show, ..display })?;
-            let pixels = pixels.into_iter().map(|[r, g, b, _]| Color32::from_rgb(r, g, b)).collect();
-            Ok(ColorImage::new(key.size.map(|side| side as usize), pixels))
-        };
-        let [first, second] = key.show();
+        if renderer.samples() == 0 {
+            renderer.resize(size.map(|side| (side / SMALL).max(16)))?;
+            renderer.render_more(SMALL_SAMPLES)?;
+            let linear = renderer.read_linear()?;
+            let known = self.exposure.take().filter(|(last, _)| last.has_exposure_of(key));
+            let found = || {
+                let most = self.turned.as_ref().map_or(f32::INFINITY, most_exposure);
+                automatic_exposure(linear.raster().pixels()).min(most)
+            };
+            let exposure = known.map_or_else(found, |(_, exposure)| exposure);
+            self.exposure = Some((key.clone(), exposure));
+            self.limits = limits(&linear, exposure * key.stops());
+            outbox.send(SceneResult::Picture(Box::new(self.image(request, None)?)));
+        }
+        if stale() {
+            return Ok(());
+        }
         let mut step = 1;
         loop {
-            if renderer.samples() < SAMPLES {
-                renderer.render_more(step)?;
+            let Some(renderer) = &mut self.renderer else { return Ok(()) };
+            renderer.resize(size)?;
+            renderer.render_more(step.min(SAMPLES.saturating_sub(renderer.samples())))?;
+            let samples = renderer.samples();
+            if samples >= FIRST_SAMPLES {
+                if let Some(map) = self.turned.as_ref().filter(|_| self.ground == GROUND_AT_FIRST) {
+                    self.ground = GROUND_DIRECTIONS;
+                    renderer.set_ground(Some(&Ground::new(&self.geometry, map, self.ground)))?;
+                }
+                outbox.send(SceneResult::Picture(Box::new(self.image(request, Some(samples))?)));
+                self.measure(request, samples, outbox)?;
+            } else {
+                renderer.wait()?;
             }
-            let image = shown(renderer, first)?;
-            let beside = if key.is_pair() { Some(shown(renderer, second)?) } else { None };
-            let (document, picture, samples) = (key.document, self.picture, renderer.samples());
-            outbox.send(SceneResult::Picture(Box::new(SceneImage {
-                document,
-                picture,
-                image,
-                beside,
-                samples,
-            })));
-            let last = samples >= SAMPLES;
-            if key.truth_is_tabulated && self.measurer.wants(picture, samples, last) {
-                let linear = renderer.read_linear()?;
-                let exposure = f64::from(display.exposure);
-                self.measurer.put(Measured { document, picture, samples, exposure, linear });
-            }
-            while !last && busy() && !stale() {
+            let is_last = samples >= SAMPLES;
+            while !is_last && busy() && !stale() {
                 std::thread::sleep(Duration::from_millis(5));
             }
-            if last || stale() {
+            if is_last || stale() {
                 return Ok(());
             }
             step = (step * 2).min(8);
         }
     }
 
+    /// The picture as it is; `samples` is `None` for a small one.
+    fn image(&mut self, request: &SceneRequest, samples: Option<u32>) -> Result<SceneImage, Stop> {
+        let key = &request.key;
+        let [first, second] = key.show();
+        let image = self.shown(key, first)?;
+        let beside = if key.is_pair() { Some(self.shown(key, second)?) } else { None };
+        Ok(SceneImage {
+            document: key.document,
+            request: request.number,
+            picture: self.picture,
+            image,
+            beside,
+            samples,
+            is_last: samples >= Some(SAMPLES),
+            limits: self.limits,
+        })
+    }
+
+    /// What is shown of a scene, in colour.
+    fn shown(&mut self, key: &SceneKey, show: Show) -> Result<ColorImage, Stop> {
+        let exposure = self.exposure.as_ref().map_or(1.0, |(_, exposure)| *exposure);
+        let limit = if show == Show::Sigma { self.limits.sigma } else { self.limits.difference };
+        let Some(renderer) = &mut self.renderer else { return Ok(ColorImage::default()) };
+        let display = Display {
+            show,
+            exposure: (exposure * key.stops()).clamp(1e-9, 1e9),
+            tone: ToneCurve::Filmic,
+            background: if key.light.point { Background::Black } else { Background::Environment },
+            limit: Some(limit.max(1e-6)),
+            ..Display::default()
+        };
+        let pixels = renderer.read_display(&display)?;
+        let pixels = pixels.into_iter().map(|[r, g, b, _]| Color32::from_rgb(r, g, b)).collect();
+        Ok(ColorImage::new(renderer.size().map(|side| side as usize), pixels))
+    }
+
+    /// Has truth and prediction compared now and then, and hands out the smooth picture.
+    fn measure(
+        &mut self,
+        request: &SceneRequest,
+        samples: u32,
+        outbox: &Outbox<SceneResult>,
+    ) -> Result<(), Stop> {
+        let key = &request.key;
+        let (document, picture, is_last) = (key.document, self.picture, samples >= SAMPLES);
+        let compared = key.truth_is_tabulated && self.measurer.wants(picture, samples, is_last);
+        let wanted = compared || (is_last && self.handed != picture);
+        let Some(renderer) = self.renderer.as_ref().filter(|_| wanted) else { return Ok(()) };
+        let linear = Arc::new(renderer.read_linear()?);
+        if compared {
+            self.measurer.put(Measured { document, picture, samples, linear: Arc::clone(&linear) });
+        }
+        if is_last && self.handed != picture {
+            self.handed = picture;
+            let mut truth = None;
+            let mut difference = None;
+            if key.truth_is_tabulated {
+                truth = Some(self.shown(key, Show::Truth)?);
+                difference = Some(self.shown(key, Show::Difference)?);
+            }
+            let prediction = self.shown(key, Show::Prediction)?;
+            let limits = self.limits;
+            let whole = Whole { document, picture, truth, prediction, difference, limits, linear };
+            outbox.send(SceneResult::Whole(Box::new(whole)));
+        }
+        Ok(())
+    }
+
     /// Hands the renderer what has changed.
     fn prepare(&mut self, request: &SceneRequest) -> Result<(), Stop> {
         let key = &request.key;
-        let context = match &self.context {
-            Some(context) => context.clone(),
-            None => self.context.insert(Context::open(AdapterChoice::Any)?).clone(),
-        };
-        if self.renderer.is_none() {
-            self.renderer = Some(Renderer::new(&context, key.size)?);
-        }
+        let (context, _) = self.renderer(key.size)?;
         self.set_materials(&context, request)?;
+        let size = self.size_of(key);
         let Some(renderer) = &mut self.renderer else { return Ok(()) };
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
         if changed(&|l| l.shape == key.shape) {
-            renderer.set_geometry(&key.shape.geometry().map_err(Stop::Error)?)?;
+            self.geometry = key.shape.geometry().map_err(Stop::Error)?;
+            renderer.set_geometry(&self.geometry)?;
         }
         if changed(&|l| l.size == key.size) {
-            renderer.resize(key.size)?;
+            renderer.restart();
         }
-        if changed(&|l| l.orbit == key.orbit) {
-            let orbit = key.orbit;
-            let camera = Camera::perspective(0.6, 1.0).orbited(orbit.azimuth, orbit.elevation);
-            renderer.set_camera(camera.zoomed(orbit.zoom))?;
+        if changed(&|l| l.orbit == key.orbit) || changed(&|l| l.shape == key.shape) {
+            renderer.set_camera(key.camera())?;
         }
         // A point light moves with the eye.
-        let same_light = |l: &SceneKey| l.light == key.light && l.environment == key.environment;
-        if changed(&|l| same_light(l) && (!key.light.point || l.orbit == key.orbit)) {
-            renderer.set_light(light(&context, key, &request.environment)?)?;
+        let same_light = |l: &SceneKey| l.light.is_like(&key.light) && l.environment == key.environment;
+        if changed(&|l| same_light(l) && (!key.light.point || l.camera() == key.camera())) {
+            let turned = turned(&request.environment, key.light.yaw, key.light.pitch);
+            renderer.set_light(light(&context, key, &turned)?)?;
+            self.turned = (!key.light.point).then_some(turned);
         }
-        if renderer.samples() == 0 || changed(&|l| l.exposure == key.exposure) {
+        if changed(&|l| same_light(l) && l.shape == key.shape) {
+            self.ground = GROUND_AT_FIRST;
+            let ground = self.turned.as_ref().map(|map| Ground::new(&self.geometry, map, self.ground));
+            renderer.set_ground(ground.as_ref())?;
+        }
+        // A small picture that was interrupted says nothing of the whole one.
+        if renderer.size() != size {
+            renderer.restart();
+        }
+        if renderer.samples() == 0 {
             self.picture += 1;
+        } else if changed(&|l| l.light.exposure == key.light.exposure) {
+            self.picture += 1;
+            let exposure = self.exposure.as_ref().map_or(1.0, |(_, exposure)| *exposure);
+            self.limits = limits(&renderer.read_linear()?, exposure * key.stops());
         }
         self.last = Some(key.clone());
         Ok(())
@@ -298,28 +525,101 @@ fn largest_channel(table: &BrdfTable) -> Vec<f32> {
     table.values().iter().map(|cell| cell.iter().copied().fold(0.0, f32::max)).collect()
 }
 
-/// The light of a request. A point light keeps its place over the picture while the eye orbits.
+/// The light of a request, from an environment that has been turned. A point light keeps its place over the picture
+/// while the eye orbits.
 fn light(context: &Context, key: &SceneKey, environment: &Environment) -> gpbrdf_render::Result<Light> {
     if key.light.point {
         let [x, y] = key.light.at.map(to_f32);
         let view = Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt());
-        let camera = Camera::perspective(0.6, 1.0).orbited(key.orbit.azimuth, key.orbit.elevation);
         return Ok(Light::Directional {
-            direction: camera.world_from_view() * view,
+            direction: key.camera().world_from_view() * view,
             irradiance: [std::f32::consts::PI; 3],
         });
     }
-    Ok(Light::Environment(EnvironmentLight::for_device(context, &turned(environment, key.light.yaw))?))
+    Ok(Light::Environment(EnvironmentLight::for_device(context, environment)?))
 }
 
-/// The environment turned about the vertical axis, by whole pixels.
+/// The environment turned by `yaw` about the vertical axis, which takes the light before the object to its right, and
+/// then by `pitch` about the horizontal one, which takes it down. Without a pitch it is turned by whole pixels, else
+/// interpolated.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of the width")]
-fn turned(environment: &Environment, yaw: f64) -> Environment {
+fn turned(environment: &Environment, yaw: f64, pitch: f64) -> Environment {
     let map = environment.raster();
-    let width = map.width();
-    let shift = ((yaw / std::f64::consts::TAU).rem_euclid(1.0) * width as f64) as usize % width.max(1);
-    let turned = Raster::from_fn(width, map.height(), |x, y| *map.at((x + shift) % width, y));
+    let (width, height) = (map.width(), map.height());
+    let turned = if pitch == 0.0 {
+        let shift = ((yaw / TAU).rem_euclid(1.0) * width as f64) as usize % width.max(1);
+        Raster::from_fn(width, height, |x, y| *map.at((x + shift) % width, y))
+    } else {
+        let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
+        let pixel = |i: usize| {
+            let azimuth = TAU * ((i % width) as f64 + 0.5) / width as f64 - PI;
+            let (sine, y) = (PI * ((i / width) as f64 + 0.5) / height as f64).sin_cos();
+            let (x, z) = (sine * azimuth.sin(), -sine * azimuth.cos());
+            let (y, z) = (cp * y + sp * z, cp * z - sp * y);
+            interpolated(map, [cy * x - sy * z, y, cy * z + sy * x])
+        };
+        let pixels = (0..width * height).into_par_iter().map(pixel).collect();
+        Raster::new(width, height, pixels).unwrap_or_else(|_| map.clone())
+    };
     Environment::new(turned).unwrap_or_else(|_| environment.clone())
+}
+
+/// The radiance of a map in a direction, between its pixels.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in a map")]
+fn interpolated(map: &Raster<[f32; 3]>, [x, y, z]: [f64; 3]) -> [f32; 3] {
+    let (width, height) = (map.width(), map.height());
+    let column = (x.atan2(-z) / TAU + 0.5) * width as f64 - 0.5;
+    let row = (x.hypot(z).atan2(y) / PI * height as f64 - 0.5).clamp(0.0, (height - 1) as f64);
+    let left = column.floor().rem_euclid(width as f64) as usize % width;
+    let columns = [left, (left + 1) % width];
+    let rows = [row as usize, (row as usize + 1).min(height - 1)];
+    let (s, t) = (to_f32(column - column.floor()), to_f32(row - row.floor()));
+    std::array::from_fn(|c| {
+        let at = |i: usize, j: usize| map.at(columns[i], rows[j])[c];
+        let line = |j: usize| at(0, j) + s * (at(1, j) - at(0, j));
+        line(0) + t * (line(1) - line(0))
+    })
+}
+
+/// The factor of radiance at which nine tenths of an object are below 0.6 of white, as in the image metrics, or a
+/// smaller one: the tone curve comes near its white at 6, and no more than one pixel in 500 is brighter than that.
+/// The truth is exposed, or the prediction where it is alone.
+fn automatic_exposure(pixels: &[LinearPixel]) -> f32 {
+    let inside = pixels.iter().filter(|pixel| is_inside(pixel));
+    let mut brightest: Vec<f32> =
+        inside.map(|pixel| pixel.truth.into_iter().fold(0.0, f32::max)).filter(|x| x.is_finite()).collect();
+    brightest.sort_unstable_by(f32::total_cmp);
+    let Some(last) = brightest.len().checked_sub(1) else { return 1.0 };
+    let [usual, bright] = [last * 9 / 10, last * 499 / 500].map(|at| brightest[at]);
+    let exposure = (0.6 / usual).min(6.0 / bright);
+    if exposure.is_normal() { exposure } else { 1.0 }
+}
+
+/// The factor at which a quarter of the directions of an environment are brighter than 1.2, which the tone curve shows
+/// as a light grey: what is behind an object is not burnt out either.
+fn most_exposure(environment: &Environment) -> f32 {
+    let pixels = environment.raster().pixels().iter();
+    let mut brightest: Vec<f32> = pixels.map(|pixel| pixel.iter().copied().fold(0.0, f32::max)).collect();
+    let at = brightest.len() * 3 / 4;
+    let (_, level, _) = brightest.select_nth_unstable_by(at, f32::total_cmp);
+    let exposure = 1.2 / *level;
+    if exposure.is_normal() { exposure } else { f32::INFINITY }
+}
+
+/// Whether an object covers the whole pixel.
+fn is_inside(pixel: &LinearPixel) -> bool {
+    pixel.coverage >= 1.0
+}
+
+/// The ends of the scales, which hold 99 % of the pixels of the object.
+fn limits(picture: &LinearPicture, exposure: f32) -> Limits {
+    let mask: Vec<bool> = picture.raster().pixels().iter().map(is_inside).collect();
+    let limit = |values: &[f32]| {
+        let wide: Vec<f64> = values.iter().copied().map(f64::from).collect();
+        to_f32(round_limit(&wide, &mask))
+    };
+    let sigma = picture.raster().map(|pixel| pixel.sigma);
+    Limits { difference: limit(&picture.difference(exposure)), sigma: limit(sigma.pixels()) }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the device")]
@@ -330,6 +630,59 @@ fn to_f32(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exposure_keeps_highlights_below_white_and_leaves_out_what_is_behind() {
+        let pixel =
+            |truth: f32, coverage: f32| LinearPixel { truth: [truth; 3], coverage, ..Default::default() };
+        let mut pixels = vec![pixel(0.2, 1.0); 1000];
+        pixels.extend([pixel(1e6, 0.0); 500]);
+        assert!((automatic_exposure(&pixels) - 3.0).abs() < 1e-5);
+        // A highlight of one pixel in 20 is 40 times as bright as may be shown so.
+        pixels.extend([pixel(80.0, 1.0); 50]);
+        assert!((automatic_exposure(&pixels) - 6.0 / 80.0).abs() < 1e-6);
+        // One pixel alone changes nothing.
+        let pixels = [vec![pixel(0.2, 1.0); 1000], vec![pixel(80.0, 1.0)]].concat();
+        assert!((automatic_exposure(&pixels) - 3.0).abs() < 1e-5);
+        for nothing in [vec![], vec![pixel(0.0, 1.0)], vec![pixel(f32::NAN, 1.0)]] {
+            assert_eq!(automatic_exposure(&nothing), 1.0);
+        }
+    }
+
+    #[test]
+    fn an_environment_turns_as_a_solid_body() {
+        // A lamp before the object, which is at +z: between columns 0 and 63, at the height of the eye.
+        let lamp = |x: usize, y: usize| (x == 0 || x == 63) && (y == 15 || y == 16);
+        let map = Raster::from_fn(64, 32, |x, y| if lamp(x, y) { [1.0; 3] } else { [0.0; 3] });
+        let map = Environment::new(map).unwrap();
+        let brightest = |map: &Environment| -> [f64; 3] {
+            let (mut sum, mut total) = ([0.0; 3], 0.0);
+            for y in 0..32 {
+                for x in 0..64 {
+                    let azimuth = TAU * (x as f64 + 0.5) / 64.0 - PI;
+                    let (sine, height) = (PI * (y as f64 + 0.5) / 32.0).sin_cos();
+                    let weight = f64::from(map.raster().at(x, y)[0]) * sine;
+                    let direction = [sine * azimuth.sin(), height, -sine * azimuth.cos()];
+                    for c in 0..3 {
+                        sum[c] += weight * direction[c];
+                    }
+                    total += weight;
+                }
+            }
+            sum.map(|s| s / total)
+        };
+        for (yaw, pitch, expected) in [
+            (0.0, 0.0, [0.0, 0.0, 1.0]),
+            (PI / 4.0, 0.0, [0.5f64.sqrt(), 0.0, 0.5f64.sqrt()]),
+            (0.0, PI / 4.0, [0.0, -(0.5f64.sqrt()), 0.5f64.sqrt()]),
+            (PI / 4.0, PI / 2.0, [0.5f64.sqrt(), -(0.5f64.sqrt()), 0.0]),
+        ] {
+            let found = brightest(&turned(&map, yaw, pitch));
+            for (a, b) in std::iter::zip(found, expected) {
+                assert!((a - b).abs() < 0.03, "{yaw} {pitch}: {found:?}, not {expected:?}");
+            }
+        }
+    }
 
     #[test]
     fn sigma_of_three_channels_is_the_largest_of_them() {

@@ -1,12 +1,14 @@
 //! Slices of truth, prediction, difference and sigma in colour, made on a thread of their own.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage};
+use gpbrdf_core::brdf::GRAZING_COSINE;
 use gpbrdf_core::figure::round_limit;
-use gpbrdf_core::figure::{Colormap, Slice};
+use gpbrdf_core::figure::{Colormap, Slice, SliceOptions};
 use gpbrdf_core::sample::log_value;
-use gpbrdf_core::{Brdf, BrdfTable, Rgb, Source};
+use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Rgb, Source};
 
 use crate::viewer::state::document::{Document, DocumentId};
 use crate::viewer::state::look::{Channel, SliceLook};
@@ -127,19 +129,20 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
             )
         },
     );
+    let counted = counted(&options);
     let plain =
         |slice: &Slice| SliceImage { image: image(slice, |i| look.colour(slice.values()[i])), limit: None };
     let difference = truth.as_ref().map(|truth| {
         let gap: Vec<f64> = std::iter::zip(mean.values(), truth.values())
             .map(|(a, b)| look.channel.of(std::array::from_fn(|c| log_value(a[c]) - log_value(b[c]))))
             .collect();
-        let limit = round_limit(&gap, mean.above_horizon());
+        let limit = round_limit(&gap, &counted);
         let image = image(truth, |i| colour(Colormap::Diverging, 0.5 + 0.5 * gap[i] / limit));
         SliceImage { image, limit: Some(limit) }
     });
     let sigma = sigma.map(|slice| {
         let values: Vec<f64> = slice.values().iter().map(|&v| look.channel.of(v)).collect();
-        let limit = round_limit(&values, slice.above_horizon());
+        let limit = round_limit(&values, &counted);
         let image = image(&slice, |i| colour(Colormap::Sequential, values[i] / limit));
         SliceImage { image, limit: Some(limit) }
     });
@@ -147,6 +150,21 @@ pub(crate) fn make(request: &SliceRequest) -> SliceImages {
         key: request.key,
         slices: [truth.as_ref().map(plain), Some(plain(&mean)), difference, sigma],
     }
+}
+
+/// Whether each pixel of a slice counts for the ends of scales: those of the image metrics do, where both cosines are
+/// at least [`GRAZING_COSINE`]. A row of cells beyond them would make all others look alike.
+fn counted(options: &SliceOptions) -> Vec<bool> {
+    let size = options.size;
+    let share = |i: usize| (i as f64 + 0.5) / size as f64;
+    let is_counted = |i: usize| {
+        let x = share(i % size);
+        let theta_h = FRAC_PI_2 * if options.square_theta_h { x * x } else { x };
+        let theta_d = FRAC_PI_2 * (1.0 - share(i / size));
+        let (cos_i, cos_o) = HalfDiff { theta_h, theta_d, phi_d: options.phi_d }.cosines();
+        cos_i.min(cos_o) >= GRAZING_COSINE
+    };
+    (0..size * size).map(is_counted).collect()
 }
 
 /// A colour of a map.
@@ -164,6 +182,24 @@ fn image(slice: &Slice, colour: impl Fn(usize) -> Color32) -> ColorImage {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_grazing_row_does_not_set_the_scale() {
+        let table = |odd: f64| {
+            BrdfTable::from_fn(|a: HalfDiff| if a.theta_h > 1.5 { [0.1 * odd; 3] } else { [0.1; 3] })
+        };
+        let key = SliceKey {
+            document: DocumentId(0),
+            version: 0,
+            look: SliceLook::default(),
+            truth_is_tabulated: true,
+            has_sigma: false,
+        };
+        let truth = Some(Truth::Table(Arc::new(table(1.0))));
+        let request = SliceRequest { key, truth, mean: Arc::new(table(2e4)), sigma: None };
+        let difference = make(&request).slices[2].clone().unwrap();
+        assert!(difference.limit.unwrap() < 0.01, "{:?}", difference.limit);
+    }
 
     #[test]
     fn channels_and_chroma_change_the_colour() {

@@ -13,7 +13,7 @@ use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
 use crate::viewer::ui::pane::{
     Command, Offers, Order, Pane, PaneContext, Place, Progress, Start, restored, saved,
 };
-use crate::viewer::ui::widgets::{Number, short, tool_ui};
+use crate::viewer::ui::widgets::{Number, short, subscripted, tool_ui};
 use crate::viewer::work::dialogs::{Access, Question};
 use crate::viewer::work::export;
 use crate::viewer::work::mailbox::Sender;
@@ -367,7 +367,7 @@ fn list_ui(ui: &mut Ui, plan: &Plan) -> Option<usize> {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             egui::Grid::new("planned").num_columns(5).striped(true).spacing([14.0, 3.0]).show(ui, |ui| {
                 for title in ["", "θi", "θo", "φo", "error after"] {
-                    ui.label(RichText::new(title).strong());
+                    ui.label(subscripted(title));
                 }
                 ui.end_row();
                 for (rank, geometry) in plan.geometries.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Color32, RichText, Ui};
 
-use crate::viewer::state::document::{Document, DocumentId};
+use crate::viewer::state::document::{Document, DocumentId, Work};
 use crate::viewer::ui::pane::{Order, Pane, PaneContext, Place};
 use crate::viewer::ui::shortcuts::OPEN;
 use crate::viewer::ui::widgets::section_ui;
@@ -81,7 +81,7 @@ fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<Doc
                 ui.add(field).accessible_name("Name").on_hover_text("Type to rename");
             } else {
                 let button = egui::Button::new(&name).frame(false).truncate();
-                let layout = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true);
+                let layout = egui::Layout::left_to_right(egui::Align::Center);
                 let size = egui::vec2(width, ui.spacing().interact_size.y);
                 let shown = ui.allocate_ui_with_layout(size, layout, |ui| ui.add(button));
                 if shown.inner.clicked() {
@@ -97,8 +97,20 @@ fn row_ui(ui: &mut Ui, document: &mut Document, selected: bool, solo: Option<Doc
             if remove.on_hover_text("Close this material").clicked() {
                 click = Some(Click::Remove(document.id));
             }
-            if document.is_busy() {
-                ui.spinner();
+            match &document.work {
+                Work::Waiting | Work::Running { .. } => {
+                    let text = document.work.text().unwrap_or_default();
+                    ui.add(egui::Spinner::new()).on_hover_text(text);
+                }
+                Work::Failed(message) => {
+                    let mark = RichText::new("!").strong().color(ui.visuals().error_fg_color);
+                    ui.label(mark).on_hover_text(message).accessible_name(format!("{name} has failed"));
+                }
+                Work::Cancelled => {
+                    let help = "Cancelled; \"Try again\" below fits it";
+                    ui.weak("–").on_hover_text(help).accessible_name(format!("{name} is cancelled"));
+                }
+                Work::Idle => {}
             }
         });
     });

@@ -3,6 +3,7 @@
 //! To add a pane, write `x.rs` with a type that implements [`Pane`], and name it twice here: in a `mod` line
 //! and in [`all`]. Menu, shortcuts, layout, settings and sessions follow from this list.
 
+mod data;
 mod directions;
 mod materials;
 mod model;
@@ -24,5 +25,6 @@ pub(crate) fn all(start: &Start) -> std::io::Result<Vec<Box<dyn Pane>>> {
         Box::new(plots::Plots::new(start)?),
         Box::new(three_d::ThreeD::new(start)?),
         Box::new(directions::Directions::new(start)?),
+        Box::new(data::Data::default()),
     ])
 }

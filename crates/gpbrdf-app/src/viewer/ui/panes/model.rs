@@ -8,13 +8,13 @@ use gpbrdf_core::judge::{LeftOut, Outlier};
 use gpbrdf_core::{LatticeLayout, MeanFunction, Progress, Shape, Symmetry};
 
 use crate::job::{
-    Kernels, LayoutChoice, ModelSpec, NoiseChoice, PriorName, SymmetryChoice, TransformChoice, hyper_sliders,
-    remaining,
+    Kernels, LayoutChoice, ModelSpec, NoiseChoice, PriorName, SymmetryChoice, TransformChoice, bound_name,
+    hyper_sliders, remaining,
 };
 use crate::viewer::state::document::{Document, Work};
 use crate::viewer::ui::pane::{Command, Offers, Order, Pane, PaneContext, Place, Start};
 use crate::viewer::ui::shortcuts::CANCEL;
-use crate::viewer::ui::widgets::{Number, choice_ui, reset, row_ui, section_ui, short};
+use crate::viewer::ui::widgets::{Number, choice_ui, narrow, reset, row_ui, section_ui, short};
 use crate::viewer::work::dialogs::{Access, Question};
 use crate::viewer::work::export;
 use crate::viewer::work::outbox::Outbox;
@@ -29,6 +29,7 @@ const MAX_SCATTERED: f64 = 20_000.0;
 enum Click {
     Optimise,
     Cancel,
+    Retry,
 }
 
 /// The pane of the model.
@@ -103,6 +104,7 @@ impl Pane for ModelPane {
         metrics_ui(ui, document);
         match click {
             Some(Click::Optimise) => document.optimise(),
+            Some(Click::Retry) => document.retry(),
             Some(Click::Cancel) => {
                 let id = document.id;
                 cx.order(Order::Cancel(id));
@@ -237,8 +239,8 @@ fn hyper_ui(ui: &mut Ui, document: &mut Document) {
     for (index, parameter) in hyper_sliders(&hyper).into_iter().enumerate() {
         let default = defaults.get(index).map_or(parameter.value, |d| d.value);
         let (low, high) = parameter.range;
-        let help = "Set by hand; the search found the default";
-        let mut number = Number::new(&parameter.name, low..=high, default, help);
+        let help = format!("{}\nSet by hand; the search found the default", parameter.help);
+        let mut number = Number::new(&parameter.name, low..=high, default, &help);
         number.logarithmic = true;
         let mut value = parameter.value;
         if number.row_ui(ui, &mut value) {
@@ -270,25 +272,14 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
             click = Some(Click::Cancel);
         }
         match &document.work {
-            Work::Running { stage, since, progress, .. } => {
+            Work::Running { .. } | Work::Waiting => {
                 ui.spinner();
-                let seconds = since.elapsed().as_secs_f64();
-                let text = if progress.evaluations > 0 {
-                    format!("{} ({})", stage.label(), progress.evaluations)
-                } else {
-                    stage.label().to_owned()
-                };
-                ui.label(if seconds > 1.0 { format!("{text}, {seconds:.0} s") } else { text });
             }
-            Work::Waiting => {
-                ui.spinner();
-                ui.label("Waiting");
-            }
-            Work::Cancelled => {
-                ui.label("Cancelled");
-            }
-            Work::Failed(_) => {
-                ui.colored_label(ui.visuals().error_fg_color, "Failed");
+            Work::Failed(_) | Work::Cancelled => {
+                let help = "Fit the model that is wanted now, from the start";
+                if ui.button("Try again").on_hover_text(help).clicked() {
+                    click = Some(Click::Retry);
+                }
             }
             Work::Idle => {
                 let mode = if document.spec.hyper.is_some() { "By hand" } else { "Optimised" };
@@ -296,12 +287,16 @@ fn work_ui(ui: &mut Ui, document: &Document) -> Option<Click> {
             }
         }
     });
+    if let Some(text) = document.work.text() {
+        let failed = matches!(document.work, Work::Failed(_));
+        let colour = if failed { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+        ui.colored_label(colour, text);
+    }
     // What is over at once needs no bar.
     if let Work::Running { begun, progress: Progress { share: Some(share), .. }, .. } = document.work
-        && let Some(left) = remaining(begun.elapsed(), share)
+        && remaining(begun.elapsed(), share).is_some()
     {
-        #[expect(clippy::cast_possible_truncation, reason = "it becomes a number of pixels")]
-        ui.add(egui::ProgressBar::new(share as f32).text(format!("{:.0} %, {left}", 100.0 * share)));
+        ui.add(egui::ProgressBar::new(narrow(share)).desired_height(6.0));
     }
     click
 }
@@ -358,7 +353,8 @@ fn metrics_ui(ui: &mut Ui, document: &Document) {
             "Evaluations of the likelihood",
         );
         if !report.at_bound.is_empty() {
-            line(ui, "At a bound", report.at_bound.join(", "), "Hyper-parameters at the end of their range");
+            let names: Vec<String> = report.at_bound.iter().map(|name| bound_name(name)).collect();
+            line(ui, "At a bound", names.join(", "), "Hyper-parameters at the end of their range");
         }
     }
     if let Some(left_out) = &fitted.left_out {

@@ -5,21 +5,21 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use eframe::egui::{self, Align2, Color32, Context, RichText, TextureHandle, Ui, vec2};
+use eframe::egui::{self, Align2, Color32, Context, RichText, TextureHandle, Ui, Visuals, vec2};
 use egui_plot::{AxisHints, GridInput, GridMark, Plot, PlotImage, PlotPoint, PlotUi, Points};
 use gpbrdf_core::figure::Colormap;
 use gpbrdf_core::{Brdf, HalfDiff};
 use serde::{Deserialize, Serialize};
 
 use super::directions::PLANNED;
-use crate::viewer::state::document::Document;
+use crate::viewer::state::document::{Document, Work};
 use crate::viewer::state::look::{Channel, SliceLook};
 use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
 use crate::viewer::ui::pane::{
     Command, Offers, Order, Pane, PaneContext, Place, Progress, Share, Slot, Start, restored, saved,
 };
 use crate::viewer::ui::widgets::{
-    Number, narrow, put_texture, scale_ui, segments_ui, short, tool_ui, tools_menu_ui,
+    Number, narrow, put_texture, scale_ui, segments_ui, short, subscripted, tool_ui, tools_menu_ui,
 };
 use crate::viewer::work::curves::band_at;
 use crate::viewer::work::dialogs::{Access, Question};
@@ -30,21 +30,19 @@ use crate::viewer::work::slices::{SliceImages, SliceKey, SliceRequest, Truth, sp
 
 /// Titles of the four views.
 const TITLES: [&str; 4] = ["Truth", "Prediction", "Difference", "Sigma"];
-/// Indices of two of them.
-const PREDICTION: usize = 1;
+/// The index of one of them.
 const DIFFERENCE: usize = 2;
 
 /// What the colours of each view mean.
 const MEANINGS: [&str; 4] =
-    ["f, 1/sr", "f, 1/sr", "ln(prediction + 0.001) - ln(truth + 0.001)", "standard deviation of the target"];
+    ["f, 1/sr", "f, 1/sr", "ln(prediction + 0.001) − ln(truth + 0.001)", "standard deviation of the target"];
 
 /// Room for the axes of a view.
 const AXES: egui::Vec2 = vec2(72.0, 40.0);
 /// Height of a view's title and the gap below it.
-const TITLE: f32 = 28.0;
-/// Titles of at least these widths have room for the whole and for the short meaning of the false colours.
-const WITH_MEANING: f32 = 470.0;
-const WITH_SHORT_MEANING: f32 = 350.0;
+const TITLE: f32 = 46.0;
+/// From this height on a view has room for what its colours mean; the tooltip of its title says it, too.
+const CAPTIONED: f32 = 180.0;
 /// Between two views.
 const GAP: f32 = 10.0;
 /// From this width on, all tools are in one row.
@@ -161,12 +159,10 @@ impl Pane for Slices {
         self.tools_ui(ui);
         let Some(document) = cx.documents.selected() else { return };
         let Some(shown) = self.shown.as_ref().filter(|s| s.key.document == document.id) else {
-            ui.centered_and_justified(|ui| {
-                ui.horizontal(|ui| {
-                    ui.spinner();
-                    ui.label("Fitting a model to the measurements");
-                })
-            });
+            if waiting_ui(ui, document) {
+                let id = document.id;
+                cx.documents.get_mut(id).into_iter().for_each(Document::retry);
+            }
             return;
         };
         let grid = Grid { look: &self.look, shown, document, reset: cx.reset_views };
@@ -223,12 +219,17 @@ impl Slices {
     fn tools_ui(&mut self, ui: &mut Ui) {
         let Look { slices: look, samples, plan, regions } = &mut self.look;
         let exposure = Number::new("Exposure", -8.0..=8.0, 0.0, "Stops: values are shown times 2 to this");
-        let gamma = Number::new("Gamma", 1.0..=4.0, 2.2, "Values are shown to the power of one over this");
+        let gamma = Number::new(
+            "Gamma",
+            1.0..=4.0,
+            2.2,
+            "Values are shown to the power of one over this, which has no unit",
+        );
         let wide = ui.available_width() > WIDE;
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Slices").strong().size(15.0));
             ui.add_space(6.0);
-            let help = "Azimuth of the light about the half vector";
+            let help = "Azimuth of the light about the half vector, degrees";
             let mut number = Number::new("φd", 0.0..=180.0, 90.0, help);
             number.suffix = "°";
             tool_ui(ui, number, 220.0, &mut look.phi_d);
@@ -239,7 +240,7 @@ impl Slices {
             segments_ui(ui, &mut look.channel, &Channel::ALL, Channel::name);
             ui.add_space(6.0);
             tools_menu_ui(ui, "Show", |ui| {
-                ui.checkbox(&mut look.square_theta_h, "Square θh")
+                ui.checkbox(&mut look.square_theta_h, subscripted("Square θh"))
                     .on_hover_text("The warp of the table: more room for the specular peak");
                 ui.checkbox(&mut look.chroma, "Chroma")
                     .on_hover_text("Colours divided by their largest channel");
@@ -254,6 +255,22 @@ impl Slices {
             });
         });
     }
+}
+
+/// What is going on while there are no slices; whether the model is to be fitted again.
+fn waiting_ui(ui: &mut Ui, document: &Document) -> bool {
+    let mut again = false;
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.3 * ui.available_height()).max(8.0));
+        if document.is_busy() || document.fitted.is_some() {
+            ui.spinner();
+        }
+        ui.label(document.work.text().unwrap_or_else(|| "Drawing slices".to_owned()));
+        if matches!(document.work, Work::Failed(_) | Work::Cancelled) {
+            again = ui.button("Fit it again").clicked();
+        }
+    });
+    again
 }
 
 /// What the pointer and the keys say about the views.
@@ -308,11 +325,11 @@ impl Grid<'_> {
         let side = (size.x - AXES.x).min(size.y - AXES.y - TITLE).max(40.0);
         ui.scope(|ui| {
             ui.set_max_width(side + AXES.x - 14.0);
-            title_ui(ui, i, self.shown.limits[i]);
+            title_ui(ui, i, self.shown.limits[i], size.y > CAPTIONED);
         });
         let room = ui.available_size();
         let side = (room.x - AXES.x).min(room.y - AXES.y).max(40.0);
-        let mut plot = slice_plot(i, side, self.look.slices.square_theta_h);
+        let mut plot = slice_plot(i, side, self.look.slices.square_theta_h, ui.visuals());
         if self.reset {
             plot = plot.reset();
         }
@@ -408,11 +425,14 @@ fn columns(views: usize, area: egui::Vec2) -> usize {
 }
 
 /// The empty plot of a view: `theta_h` to the right, `theta_d` up, both in degrees.
-fn slice_plot(i: usize, side: f32, square: bool) -> Plot<'static> {
+fn slice_plot(i: usize, side: f32, square: bool, visuals: &Visuals) -> Plot<'static> {
     let degrees =
         move |mark: GridMark| format!("{}°", short(if square { unwarped(mark.value) } else { mark.value }));
-    let theta_h = AxisHints::new_x().formatter(move |mark, _| degrees(mark)).label("θh");
-    let theta_d = AxisHints::new_y().formatter(|mark, _| format!("{}°", short(mark.value))).label("θd");
+    let theta_h = AxisHints::new_x().formatter(move |mark, _| degrees(mark)).label(subscripted("θh"));
+    let theta_d =
+        AxisHints::new_y().formatter(|mark, _| format!("{}°", short(mark.value))).label(subscripted("θd"));
+    let text = visuals.text_color();
+    let (theta_h, theta_d) = (theta_h.tick_label_color(text), theta_d.tick_label_color(text));
     Plot::new(("slice", i))
         .link_axis(egui::Id::unique("slices"), true)
         .link_cursor(egui::Id::unique("slices"), true)
@@ -434,16 +454,11 @@ fn slice_plot(i: usize, side: f32, square: bool) -> Plot<'static> {
         .custom_y_axes(vec![theta_d.min_thickness(AXES.x - 36.0)])
 }
 
-/// The title of a view, with the scale of its false colours.
-fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
+/// The title of a view, with the scale of its false colours and with what its colours mean.
+fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>, captioned: bool) {
+    ui.spacing_mut().item_spacing.y = 1.0;
     ui.horizontal(|ui| {
-        let room = ui.available_width();
         ui.label(RichText::new(TITLES[i]).strong()).on_hover_text(MEANINGS[i]);
-        if i > PREDICTION && room >= WITH_MEANING {
-            ui.label(RichText::new(MEANINGS[i]).small());
-        } else if i == DIFFERENCE && room >= WITH_SHORT_MEANING {
-            ui.label(RichText::new("prediction - truth of ln f").small());
-        }
         let Some(limit) = limit else { return };
         let (map, low, high) = if i == DIFFERENCE {
             (Colormap::Diverging, format!("-{}", short(limit)), format!("+{}", short(limit)))
@@ -457,6 +472,9 @@ fn title_ui(ui: &mut Ui, i: usize, limit: Option<f64>) {
             ui.label(RichText::new(low).small());
         });
     });
+    if captioned {
+        ui.add(egui::Label::new(RichText::new(MEANINGS[i]).small()).truncate());
+    }
 }
 
 /// The place of degrees of `theta_h` on an axis with the warp of the table.
@@ -539,7 +557,7 @@ fn hover_ui(ui: &Ui, document: &Document, angles: HalfDiff) {
     .show(|ui| {
         egui::Grid::new("values").num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
             for (name, value) in hover_lines(document, angles) {
-                ui.label(RichText::new(name).weak());
+                ui.label(subscripted(name));
                 ui.label(RichText::new(value).monospace());
                 ui.end_row();
             }

@@ -38,15 +38,15 @@ impl ThreeD {
         let light = &mut self.look.light;
         ui.radio_value(&mut light.point, false, format!("Environment: {}", self.map.name));
         ui.radio_value(&mut light.point, true, "Point light");
-        Number::new("Exposure", -8.0..=8.0, 0.0, "Stops").row_ui(ui, &mut light.exposure);
-        let help = "Where truth ends and prediction begins";
+        Number::new("Exposure", -8.0..=8.0, 0.0, "Stops above or below the automatic exposure")
+            .row_ui(ui, &mut light.exposure);
+        let help = "Where truth ends and prediction begins, as a share of the width";
         narrow_ui(ui, &Number::new("Swipe", 0.0..=1.0, 0.5, help), &mut self.look.swipe);
         if light.point {
             place_ui(ui, light);
         } else {
             degrees_ui(ui, "Turned", "The environment about the vertical axis", &mut light.yaw);
-            let help = "The environment about the horizontal axis, for the sphere only";
-            degrees_ui(ui, "Tilted", help, &mut light.pitch);
+            degrees_ui(ui, "Tilted", "The environment about the horizontal axis", &mut light.pitch);
         }
         ui.separator();
         if ui.button("Environment map…").clicked() {
@@ -73,13 +73,19 @@ fn narrow_ui(ui: &mut Ui, number: &Number<'_>, value: &mut f32) {
 }
 
 fn orbit_ui(ui: &mut Ui, orbit: &mut Orbit) {
-    let Orbit { azimuth, elevation, zoom } = Orbit::default();
-    let number = |label, range, default: f32, help| Number::new(label, range, f64::from(default), help);
-    let help = "Of the eye about an object, radians";
-    narrow_ui(ui, &number("Azimuth", -3.15..=3.15, azimuth, help), &mut orbit.azimuth);
-    let help = "Of the eye over an object, radians";
-    narrow_ui(ui, &number("Elevation", -1.5..=1.5, elevation, help), &mut orbit.elevation);
-    narrow_ui(ui, &number("Zoom", 0.3..=6.0, zoom, "How large it is"), &mut orbit.zoom);
+    let usual = Orbit::default();
+    let mut angle = |label, most: f64, usual: f32, help, radians: &mut f32| {
+        let mut number = Number::new(label, -most..=most, f64::from(usual.to_degrees()), help);
+        number.suffix = "°";
+        let mut shown = f64::from(radians.to_degrees());
+        if number.row_ui(ui, &mut shown) {
+            *radians = narrow(shown.to_radians());
+        }
+    };
+    angle("Azimuth", 180.0, usual.azimuth, "Of the eye about an object, degrees", &mut orbit.azimuth);
+    angle("Elevation", 85.0, usual.elevation, "Of the eye over an object, degrees", &mut orbit.elevation);
+    let help = "How large it is, as a factor";
+    narrow_ui(ui, &Number::new("Zoom", 0.3..=6.0, f64::from(usual.zoom), help), &mut orbit.zoom);
 }
 
 /// The place of the point light.
@@ -88,7 +94,12 @@ fn place_ui(ui: &mut Ui, light: &mut SphereLight) {
     let mut at = light.at;
     let mut changed = false;
     for (k, name) in ["Light x", "Light y"].into_iter().enumerate() {
-        let number = Number::new(name, -1.0..=1.0, fallback[k], "Where the light is over the disc");
+        let number = Number::new(
+            name,
+            -1.0..=1.0,
+            fallback[k],
+            "Where the light is over the disc, in units of its radius",
+        );
         changed |= number.row_ui(ui, &mut at[k]);
     }
     if changed {

@@ -1,20 +1,20 @@
-//! Lit spheres and objects: truth and prediction on either side of a line or side by side, their difference,
-//! sigma.
+//! Lit objects, the sphere among them: truth and prediction on either side of a line or side by side, their
+//! difference, sigma.
 
 mod controls;
+mod moves;
 mod object;
-mod sphere;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use eframe::egui::{self, Color32, Context, Rect, RichText, Sense, TextureHandle, Ui, pos2, vec2};
+use eframe::egui::{self, Color32, Context, Rect, RichText, Sense, TextureHandle, Ui, pos2};
 use gpbrdf_core::Environment;
 use gpbrdf_core::formats::read_environment;
 
 use self::object::ObjectView;
-use self::sphere::SphereView;
+use crate::viewer::state::document::DocumentId;
 use crate::viewer::state::look::{Orbit, SceneLook, Shape, SphereShown};
 use crate::viewer::ui::navigate::{ViewKeys, focus_ui, zoom_factor};
 use crate::viewer::ui::pane::{
@@ -23,17 +23,14 @@ use crate::viewer::ui::pane::{
 use crate::viewer::ui::widgets::{narrow, segments_ui, tools_menu_ui};
 use crate::viewer::work::dialogs::{Access, Question};
 use crate::viewer::work::export;
+use crate::viewer::work::mailbox::Sender;
 use crate::viewer::work::outbox::{Outbox, in_background};
-use crate::viewer::work::scene::SceneResult;
-use crate::viewer::work::spheres::SphereResult;
+use crate::viewer::work::scene::{SceneResult, Whole};
+use crate::viewer::work::sphere_metrics::{self, MetricsRequest, SphereMetrics};
 
 /// What the views are called, with what the mouse does in them.
 const SPHERE_HELP: &str = "Sphere view: drag or arrow keys turn the light";
 const OBJECT_HELP: &str = "Object view: drag or arrow keys orbit";
-
-/// The caption of differences of spheres and of objects: the mean over R, G and B of the exposed linear
-/// radiances.
-const DIFFERENCE: &str = "prediction - truth, exposed";
 
 /// Columns of an environment; larger ones are averaged.
 const MAX_COLUMNS: usize = 4096;
@@ -43,12 +40,12 @@ type ReadMap = Result<(PathBuf, Arc<Environment>), String>;
 
 /// What the pane is sent.
 enum Message {
-    Sphere(SphereResult),
+    Metrics(SphereMetrics),
     Scene(SceneResult),
     Map(ReadMap),
     /// Show what this file holds.
     Open(Shown),
-    /// Write the spheres to this file.
+    /// Write the picture to this file.
     Export(PathBuf),
 }
 
@@ -71,8 +68,14 @@ impl Map {
 pub(crate) struct ThreeD {
     look: SceneLook,
     map: Map,
-    sphere: SphereView,
     object: ObjectView,
+    /// The smooth picture that was last made.
+    whole: Option<Whole>,
+    /// Where the picture is written once it is smooth.
+    export: Option<PathBuf>,
+    metrics: Sender<MetricsRequest>,
+    /// The document and the result whose metrics were last requested.
+    measured: Option<(DocumentId, u64)>,
     outbox: Outbox<Message>,
     inbox: Receiver<Message>,
     start: Start,
@@ -85,8 +88,11 @@ impl ThreeD {
         Ok(Self {
             look: SceneLook::default(),
             map: Map::studio(0),
-            sphere: SphereView::new(outbox.map(Message::Sphere), start)?,
             object: ObjectView::new(outbox.map(Message::Scene), None, start)?,
+            whole: None,
+            export: None,
+            metrics: sphere_metrics::spawn(outbox.map(Message::Metrics), start.busy())?,
+            measured: None,
             outbox,
             inbox,
             start: start.clone(),
@@ -108,11 +114,11 @@ impl Pane for ThreeD {
     }
 
     fn commands(&mut self, offers: &mut Offers, cx: &mut PaneContext) {
-        if offers.offer(Command::menu("Export sphere…")) {
+        if offers.offer(Command::menu("Export picture…")) {
             cx.order(Order::Ask(Question {
-                title: "Export sphere",
-                help: "A PNG figure, and linear pictures as EXR files beside it.",
-                access: Access::Write { name: "sphere.png" },
+                title: "Export picture",
+                help: "The lit object as a PNG figure, and linear pictures as EXR files beside it.",
+                access: Access::Write { name: "picture.png" },
                 answer: self.outbox.map(Message::Export),
             }));
         }
@@ -145,8 +151,7 @@ impl Pane for ThreeD {
     fn receive(&mut self, ctx: &Context, cx: &mut PaneContext) {
         while let Ok(message) = self.inbox.try_recv() {
             match message {
-                Message::Sphere(SphereResult::Pictures(images)) => self.sphere.take(ctx, *images),
-                Message::Sphere(SphereResult::Metrics { document, version, images }) => {
+                Message::Metrics(SphereMetrics { document, version, images }) => {
                     let document = cx.documents.get_mut(document);
                     if let Some(fitted) = document.and_then(|d| d.result_mut(version)) {
                         fitted.images = Some(*images);
@@ -163,7 +168,10 @@ impl Pane for ThreeD {
                 Message::Open(file) => {
                     self.show(&file);
                 }
-                Message::Export(path) => self.export(cx, &path),
+                Message::Export(path) => {
+                    self.export = Some(path);
+                    self.write_when_smooth(cx);
+                }
             }
         }
     }
@@ -183,26 +191,23 @@ impl Pane for ThreeD {
         let name = if is_sphere { SPHERE_HELP } else { OBJECT_HELP };
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, name));
         ui.painter().rect_filled(area, 6.0, ui.visuals().extreme_bg_color);
-        if is_sphere {
-            if let Some(disc) = self.sphere.ui(ui, area, &self.look, document.id) {
-                sphere::drag(ui, &response, &mut self.look, disc);
-                self.navigate(ui, &response);
-            }
-        } else {
-            let picture = self.object.ui(ui, area, &self.look, document);
-            object::drag(ui, &response, &mut self.look, picture);
-            self.navigate(ui, &response);
-        }
+        let picture = self.object.ui(ui, area, &self.look, document);
+        moves::drag(ui, &response, &mut self.look, picture);
+        self.navigate(ui, &response);
     }
 
     fn request(&mut self, cx: &mut PaneContext) {
-        self.sphere.request(cx, &self.look, &self.map);
-        let exposure = self.sphere.exposure().unwrap_or(1.0);
-        self.object.request(cx, &self.look, &self.map, exposure);
+        self.object.request(cx, &self.look, &self.map);
+        let Some(request) = cx.documents.selected().and_then(MetricsRequest::of) else { return };
+        let key = Some((request.document, request.version));
+        if self.measured != key {
+            self.measured = key;
+            self.metrics.put(request);
+        }
     }
 
     fn progress(&self) -> Progress {
-        self.sphere.progress()
+        self.object.progress()
     }
 
     fn use_device(&mut self, device: &gpbrdf_render::Context) -> std::io::Result<()> {
@@ -237,8 +242,13 @@ impl ThreeD {
         match result {
             SceneResult::Picture(image) => self.object.take(ctx, *image),
             SceneResult::Quality(quality) => self.object.quality = Some(quality),
+            SceneResult::Whole(whole) => {
+                self.whole = Some(*whole);
+                self.write_when_smooth(cx);
+            }
+            SceneResult::Failed(message) if self.look.shape == Shape::Sphere => self.object.fail(message),
             SceneResult::Failed(message) => {
-                // The sphere needs no device and no file.
+                // The sphere needs no file.
                 self.look.shape = Shape::Sphere;
                 self.object.clear();
                 cx.messages.error(message);
@@ -247,24 +257,29 @@ impl ThreeD {
         }
     }
 
-    fn export(&self, cx: &mut PaneContext, path: &std::path::Path) {
-        match (cx.documents.selected(), self.sphere.images()) {
-            (Some(document), Some(images)) => export::spheres(&document.name, images, path, &cx.saved),
-            _ => cx.messages.error("nothing to export: no sphere has been drawn yet"),
+    /// Writes the picture to the file that waits for it, if there is one and the picture is smooth.
+    fn write_when_smooth(&mut self, cx: &mut PaneContext) {
+        let Some(document) = cx.documents.selected() else { return };
+        let smooth = self.whole.as_ref().filter(|whole| {
+            whole.document == document.id && self.object.picture().is_none_or(|shown| shown == whole.picture)
+        });
+        match (smooth, &self.export) {
+            (Some(whole), Some(path)) => {
+                export::picture(&document.name, whole, path, &cx.saved);
+                self.export = None;
+            }
+            (None, Some(_)) => cx.messages.note("the picture is written once it is smooth"),
+            (_, None) => {}
         }
     }
 
-    /// What wheel, right drag and keys do in both views.
+    /// What wheel, right drag and keys do.
     fn navigate(&mut self, ui: &Ui, response: &egui::Response) {
         let factor = zoom_factor(ui.ctx(), response);
         focus_ui(ui, response);
         let keys = ViewKeys::of(ui.ctx(), response);
         self.look.orbit.enlarge(factor * narrow(keys.zoom));
-        if self.look.shape == Shape::Sphere {
-            sphere::turn_by_keys(&mut self.look, &keys);
-        } else {
-            object::turn_by_keys(&mut self.look, &keys);
-        }
+        moves::turn_by_keys(&mut self.look, &keys);
         if keys.reset {
             self.look.light.reset();
             (self.look.orbit, self.look.swipe) = (Orbit::default(), 0.5);
@@ -286,23 +301,8 @@ fn square(rect: Rect) -> Rect {
     Rect::from_center_size(rect.center(), egui::Vec2::splat(rect.size().min_elem().max(1.0)))
 }
 
-/// The part of a picture between two vertical lines, within `clip`.
-fn part_ui(ui: &Ui, texture: &TextureHandle, rect: Rect, [left, right]: [f32; 2], clip: Rect) {
-    if right <= left {
-        return;
-    }
-    let u = |x: f32| (x - rect.left()) / rect.width();
-    let uv = Rect::from_min_max(pos2(u(left), 0.0), pos2(u(right), 1.0));
-    let area = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
-    ui.painter().with_clip_rect(clip).image(texture.id(), area, uv, Color32::WHITE);
-}
-
 /// A whole picture, within `clip`.
 fn whole_ui(ui: &Ui, texture: &TextureHandle, rect: Rect, clip: Rect) {
-    part_ui(ui, texture, rect, [rect.left(), rect.right()], clip);
-}
-
-/// The upper left and the upper right corner of a picture, where its captions are.
-fn corners(rect: Rect, margin: egui::Vec2) -> [egui::Pos2; 2] {
-    [rect.left_top() + margin, rect.right_top() + vec2(-margin.x, margin.y)]
+    let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+    ui.painter().with_clip_rect(clip).image(texture.id(), rect, whole, Color32::WHITE);
 }
