@@ -5,6 +5,7 @@ mod batch;
 mod check;
 mod convert;
 mod eval;
+mod figure_args;
 mod fit;
 mod info;
 mod input;

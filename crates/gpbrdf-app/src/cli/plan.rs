@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::base::number::significant;
+use gpbrdf_core::figure::FigureOptions;
 use gpbrdf_core::formats::read_environment;
 use gpbrdf_core::plan::{
     AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, MOST_MEASURED, Plan as Planned, plan, tour,
@@ -190,7 +191,7 @@ impl Plan {
         }
         if let Some(folder) = &self.output {
             let folder = OutputFolder::create(folder)?;
-            AtomicFile::write(folder.join("plan.svg"), found.picture()?.as_bytes())?;
+            found.figure().save(folder.join("plan.svg"), &FigureOptions::default())?;
         }
         Ok(())
     }

@@ -10,11 +10,12 @@ use gpbrdf_core::brdf::materials as built_in_materials;
 use gpbrdf_core::formats::{read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
+use super::figure_args::FigureSize;
 use super::input::environment;
 use super::library::read_materials;
 use super::reading::Reading;
 use super::terminal::Terminal;
-use crate::job::Observer;
+use crate::job::{FigureKind, Observer};
 use crate::output::OutputFolder;
 use crate::reproduce::{Context, Experiment, Materials, PAPER_MATERIALS, measurements, store};
 
@@ -46,6 +47,11 @@ pub(crate) struct Reproduce {
     /// [default: 60, or 1 with --quick]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     budget: Option<f64>,
+    /// The kind of file of figures.
+    #[arg(long, value_enum, value_name = "KIND", default_value_t)]
+    figures: FigureKind,
+    #[command(flatten)]
+    figure_size: FigureSize,
     /// Folder for the outputs. Experiments whose results of the same options it holds are not run again.
     #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
     output: PathBuf,
@@ -71,6 +77,8 @@ impl Reproduce {
         }
         let library = self.library(&measured, terminal)?;
         let context = Context {
+            figures: self.figures,
+            figure_size: self.figure_size.into(),
             quick: self.quick,
             budget,
             environment: environment(self.env.as_deref())?,
@@ -145,6 +153,9 @@ impl Reproduce {
             "version": env!("CARGO_PKG_VERSION"),
             "quick": self.quick,
             "budget": context.budget,
+            "figures": self.figures.extension(),
+            "width": context.figure_size.width,
+            "dpi": context.figure_size.dots_per_inch,
             "materials": self.materials,
             "measurements": measured,
             "nbrdf": sum(&self.nbrdf)?,

@@ -9,7 +9,6 @@ mod materials;
 mod measures;
 mod paper_lattice;
 mod pictures;
-mod plot;
 mod principal;
 mod prior;
 mod sampling;

@@ -132,7 +132,7 @@ impl Batch {
             "env_sha256": self.making.env.as_ref().map(sha256_file).transpose()?,
             "metrics": !self.making.no_metrics,
             "sigma": !self.making.no_sigma,
-            "write": self.write.iter().map(|product| product.file_name()).collect::<Vec<_>>(),
+            "write": self.write.iter().map(|product| product.file_name(self.making.figures)).collect::<Vec<_>>(),
         }))
     }
 }

@@ -17,6 +17,7 @@ use gpbrdf_render::{
 };
 use serde_json::{Value, json};
 
+use super::figure_args::{FigureSize, PictureFile, title};
 use super::input::{environment, open};
 use super::parse::{Exposure, parse_exposure, parse_pair, parse_positive, parse_size, parse_vector};
 use super::reading::Reading;
@@ -36,7 +37,7 @@ pub(crate) struct Render {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// Picture to write: .png (as shown) or .exr (linear). May be repeated.
+    /// Picture to write: .png as shown, .svg or .pdf with a title, or linear .exr. May be repeated.
     #[arg(short, long, value_name = "FILE", default_value = "render.png")]
     output: Vec<PathBuf>,
     /// The object: sphere, knot, box, or a mesh: Wavefront .obj, glTF .glb or .gltf.
@@ -103,6 +104,8 @@ pub(crate) struct Render {
     /// Where to bake.
     #[arg(long, value_enum, default_value_t)]
     backend: Backend,
+    #[command(flatten)]
+    figure_size: FigureSize,
     /// Print JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
@@ -110,6 +113,7 @@ pub(crate) struct Render {
 
 /// What is rendered with: the tables of the truth and of the prediction, as far as they are shown.
 struct Materials {
+    title: String,
     truth: Option<BrdfTable>,
     prediction: Option<Baked>,
 }
@@ -125,8 +129,8 @@ struct Rendered {
 impl Render {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         for path in &self.output {
-            if is_exr(path)? && self.compare {
-                bail!("\"{}\": expected a .png file, as --compare makes a figure", path.display());
+            if PictureFile::of(path)? == PictureFile::Exr && self.compare {
+                bail!("\"{}\": expected .png, .svg or .pdf, as --compare makes a figure", path.display());
             }
         }
         let mut run = Run::new(terminal.clone());
@@ -182,12 +186,12 @@ impl Render {
             "adapter": context.describe(),
             "exposure": exposure,
         });
-        let mut title = source.name.clone();
+        let mut title = materials.title.clone();
         if materials.truth.is_some() && materials.prediction.is_some() {
             let psnr = psnr(&truth, &prediction, exposure)?;
             let ssim = ssim(&truth, &prediction, exposure)?;
             let difference = PixelDifference::new(&truth, &prediction)?;
-            title.push_str(&format!("   PSNR {psnr:.1} dB   SSIM {ssim:.4}"));
+            title.push_str(&format!(", PSNR {psnr:.1} dB, SSIM {ssim:.4}"));
             report["psnr"] = if psnr.is_finite() { json!(psnr) } else { json!(psnr.to_string()) };
             report["ssim"] = json!(ssim);
             report["pixel_difference"] = serde_json::to_value(difference)?;
@@ -205,16 +209,15 @@ impl Render {
             ..Display::default()
         };
         let (linear, title) = (&rendered.linear, rendered.title.as_str());
-        let mut pictures = Pictures { renderer, linear, display, limit: self.limit, title };
+        let figures = self.figure_size.into();
+        let mut pictures = Pictures { renderer, linear, display, limit: self.limit, title, figures };
         let mut files = Vec::new();
         for path in &self.output {
             let mut file = AtomicFile::create(path)?;
-            let written = if is_exr(path)? {
-                pictures.write_exr(&mut file, self.show)
-            } else if self.compare {
-                pictures.write_comparison(&mut file)
-            } else {
-                pictures.write_png(&mut file, self.show)
+            let written = match PictureFile::of(path)? {
+                PictureFile::Exr => pictures.write_exr(&mut file, self.show),
+                PictureFile::Figure(format) if self.compare => pictures.write_comparison(&mut file, format),
+                PictureFile::Figure(format) => pictures.write_figure(&mut file, self.show, format),
             };
             written.with_context(|| format!("cannot write \"{}\"", path.display()))?;
             files.push(file);
@@ -300,16 +303,18 @@ impl Render {
             }
             _ => None,
         };
-        let mut prediction = None;
+        let (mut prediction, mut name) = (None, source.name.clone());
         if needs_prediction {
             if !is_model {
                 self.model.check(source)?;
             }
             let baking = Some(Baking { backend: self.backend, sigma: true });
             let job = Job { keep_model: true, baking, ..Job::new(source, &self.model) };
-            prediction = run.job(&job)?.baked;
+            let outcome = run.job(&job)?;
+            name = title(&source.name, &outcome.fitted.model);
+            prediction = outcome.baked;
         }
-        Ok(Materials { truth, prediction })
+        Ok(Materials { title: name, truth, prediction })
     }
 
     fn accumulate(&self, renderer: &mut Renderer) -> Result<()> {
@@ -339,12 +344,4 @@ fn set_materials(
         (None, None) => bail!("{}: nothing to render", source.origin()),
     }
     Ok(())
-}
-
-fn is_exr(path: &Path) -> Result<bool> {
-    match path.extension() {
-        Some(png) if png.eq_ignore_ascii_case("png") => Ok(false),
-        Some(exr) if exr.eq_ignore_ascii_case("exr") => Ok(true),
-        _ => bail!("\"{}\": expected a name that ends in .png or .exr", path.display()),
-    }
 }

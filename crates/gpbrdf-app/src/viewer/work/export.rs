@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 use eframe::egui::Context;
 use gpbrdf_core::Rgb;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::figure::{Picture, Slice, slice_figure, sphere_figure};
+use gpbrdf_core::figure::{FigureOptions, Picture, Slice, slice_figure, sphere_figure};
 use gpbrdf_core::formats::write_image_exr;
 
 use super::outbox::{Outbox, in_background};
@@ -55,7 +55,8 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
     let options = look.options();
     write(outbox, move || {
         let truth = truth.as_ref().and_then(Truth::brdf);
-        let picture = slice_figure(&name, truth, fitted.mean.as_ref(), &options)?;
+        let picture =
+            slice_figure(&name, truth, fitted.mean.as_ref(), &options)?.picture(&FigureOptions::default())?;
         let mut files = vec![png_file(&path, &picture)?];
         let size = [options.size; 2];
         let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
@@ -83,7 +84,8 @@ pub(crate) fn spheres(name: &str, images: &SphereImages, path: &Path, outbox: &O
     let (truth, prediction) = (images.linear_truth.clone(), images.linear_mean.clone());
     let (name, path, psnr) = (name.to_owned(), path.with_extension("png"), images.psnr);
     write(outbox, move || {
-        let picture = sphere_figure(&name, truth.as_ref(), &prediction, psnr)?;
+        let picture =
+            sphere_figure(&name, truth.as_ref(), &prediction, psnr)?.picture(&FigureOptions::default())?;
         let mut files = vec![png_file(&path, &picture)?];
         let linear = truth.iter().map(|image| ("truth", image)).chain([("prediction", &prediction)]);
         for (which, image) in linear {
