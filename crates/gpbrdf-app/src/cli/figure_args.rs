@@ -11,6 +11,7 @@ use super::parse::parse_number_in;
 
 /// Size of figures.
 #[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Output")]
 pub(super) struct FigureSize {
     /// Width of figures in mm; a column of a paper is about 85 wide, two are 178.
     #[arg(long, value_name = "MM", default_value_t = 178.0, value_parser = parse_width)]
@@ -68,7 +69,7 @@ pub(super) fn title(name: &str, model: &Model) -> String {
 }
 
 /// A number with a comma before every three digits.
-fn grouped(n: usize) -> String {
+pub(super) fn grouped(n: usize) -> String {
     let digits = n.to_string();
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {

@@ -15,10 +15,11 @@ use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
 use super::figure_args::{FigureSize, title};
 use super::input::environment;
+use super::json::to_json;
 use super::reading::Reading;
 use crate::job::{
-    Backend, Baked, Baking, FigureKind, Job, Judging, ModelSpec, Outcome, Report, Run, Stage, Subject, Truth,
-    portrait,
+    Backend, Baked, Baking, FigureKind, Job, Judging, ModelSpec, Outcome, Portrait, Report, Run, Stage,
+    Subject, Truth,
 };
 use crate::output::OutputFolder;
 
@@ -33,19 +34,19 @@ pub(super) struct Making {
     #[command(flatten)]
     pub(super) model: ModelSpec,
     /// Where to bake.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(help_heading = "Output", long, value_enum, default_value_t)]
     pub(super) backend: Backend,
     /// Environment map (.hdr or .exr, latitude-longitude) of the image metrics instead of the built-in one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Output", long, value_name = "FILE")]
     pub(super) env: Option<PathBuf>,
     /// Do not compare with the truth; its table is not computed.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub(super) no_metrics: bool,
     /// Do not bake the standard deviation.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub(super) no_sigma: bool,
     /// The kind of file of the figures of slice and sphere.
-    #[arg(long, value_enum, value_name = "KIND", default_value_t)]
+    #[arg(help_heading = "Output", long, value_enum, value_name = "KIND", default_value_t)]
     pub(super) figures: FigureKind,
     #[command(flatten)]
     pub(super) figure_size: FigureSize,
@@ -164,7 +165,8 @@ impl Making {
                     psnr: outcome.metrics.as_ref().map(|metrics| metrics.images.psnr_env),
                 };
                 let observer = run.observer();
-                Some(run.stage(Stage::Render, || portrait(&subject, environment, self.backend, &*observer))?)
+                let draw = || Ok(Portrait::new(&subject, environment, self.backend, &*observer)?.figure());
+                Some(run.stage(Stage::Render, draw)?)
             }
             _ => None,
         };
@@ -268,10 +270,7 @@ impl<'a> Outputs<'a> {
             .then(|| self.folder.join(&Product::Report.file_name(self.figures)));
         let paths = self.files.iter().map(AtomicFile::target).chain(own.as_deref());
         report.outputs = paths.map(|path| path.display().to_string()).collect();
-        self.add(Product::Report, |file| {
-            serde_json::to_writer_pretty(&mut *file, &report)?;
-            Ok(file.write_all(b"\n")?)
-        })?;
+        self.add(Product::Report, |file| Ok(file.write_all(to_json(&report)?.as_bytes())?))?;
         Ok(report)
     }
 

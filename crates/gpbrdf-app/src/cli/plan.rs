@@ -17,6 +17,7 @@ use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Content, FitOptions, HalfDiff, fit};
 
 use super::input::{environment, open};
+use super::json::to_json;
 use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{Observer, PriorName, expected_errors, plan_csv};
@@ -37,6 +38,12 @@ enum Order {
 }
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli plan --count 20 -o first.csv",
+    "\n  gpbrdf-cli plan --measured first-measured.csv --until 0.1",
+    "\n  gpbrdf-cli plan --simulate satin_purple.bsdf -o out",
+))]
 pub(crate) struct Plan {
     /// What was measured already: a file of scattered samples, or - for standard input. Without it the plan is that of
     /// the first measurements.
@@ -185,7 +192,7 @@ impl Plan {
         };
         let found = terminal.stage("Simulating", || Simulation::new(&source.name, &trial, &batches))?;
         if self.simulation.json {
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&found.json())?))?;
+            terminal.print(&to_json(&found.json())?)?;
         } else {
             terminal.print(&found.table().markdown())?;
         }

@@ -15,11 +15,16 @@ use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli slice model.safetensors --difference satin_purple.bsdf -o slice.pdf",
+    "\n  gpbrdf-cli slice phong --phi-d 0 --exposure 2 --width 85 -o slice.svg",
+))]
 pub(crate) struct SliceCommand {
     /// A measurement, table or model file, or the name of a built-in material.
     input: PathBuf,
     /// Figure to write, .png, .svg or .pdf, or values in 1/sr, .exr.
-    #[arg(short, long, value_name = "FILE", default_value = "slice.png")]
+    #[arg(help_heading = "Output", short, long, value_name = "FILE", default_value = "slice.png")]
     output: PathBuf,
     /// phi_d in degrees; at 90 every direction is above the horizon.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, allow_hyphen_values = true)]

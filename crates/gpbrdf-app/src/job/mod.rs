@@ -40,7 +40,7 @@ pub(crate) use hyper::hyper_sliders;
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
 pub(crate) use plan_file::{expected_errors, plan_csv};
-pub(crate) use portrait::{Subject, portrait};
+pub(crate) use portrait::{Portrait, Subject};
 pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]

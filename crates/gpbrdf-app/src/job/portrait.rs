@@ -1,4 +1,4 @@
-//! A figure of a sphere as `render` shows it: drawn on a device where there is one, else on the processor, by importance
+//! Pictures of a sphere as `render` shows it: drawn on a device where there is one, else on the processor, by importance
 //! sampling on both.
 
 use std::f64::consts::{PI, TAU};
@@ -28,10 +28,9 @@ const RAYS: usize = 16;
 /// Angle of view in radians, and the part of the frame that the sphere takes: those of `render`.
 const VIEW: f32 = 0.55;
 const FILL: f32 = 0.88;
-/// The reciprocal powers of the root of `x^7 = x + 1`: an additive recurrence with them as steps fills a cube of six
-/// dimensions evenly. M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
-const ROOT: f64 = 1.112_775_684_278_705_5;
-const DIMENSIONS: usize = 6;
+/// Steps of an additive recurrence that fills a square evenly: reciprocal powers of the root of `x^3 = x + 1`. M. Roberts,
+/// "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
+const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
 /// What is shown.
 #[derive(Clone, Copy, Debug)]
@@ -45,29 +44,86 @@ pub(crate) struct Subject<'a> {
     pub(crate) psnr: Option<f64>,
 }
 
-/// Draws truth, prediction and difference, or the prediction alone if there is no truth.
-///
-/// # Errors
-/// A table with values that are not finite.
-pub(crate) fn portrait(
-    subject: &Subject<'_>,
-    environment: &Environment,
-    backend: Backend,
-    observer: &dyn Observer,
-) -> Result<Figure> {
-    let device = if backend == Backend::Cpu { None } else { Context::open(AdapterChoice::Hardware).ok() };
-    let on_device = device.and_then(|context| match on_device(&context, subject, environment) {
-        Ok(pixels) => Some(pixels),
-        Err(error) => {
-            observer.detail(&format!("drawing the sphere on the CPU: {error}"));
-            None
+/// Truth and prediction, shaded.
+#[derive(Debug)]
+pub(crate) struct Portrait<'a> {
+    subject: Subject<'a>,
+    environment: &'a Environment,
+    pixels: Raster<LinearPixel>,
+    exposure: f64,
+}
+
+impl<'a> Portrait<'a> {
+    /// Shades truth and prediction, or the prediction alone if there is no truth.
+    ///
+    /// # Errors
+    /// A table with values that are not finite.
+    pub(crate) fn new(
+        subject: &Subject<'a>,
+        environment: &'a Environment,
+        backend: Backend,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let device = if backend == Backend::Cpu { None } else { Context::open(AdapterChoice::Hardware).ok() };
+        let drawn = device.and_then(|context| match on_device(&context, subject, environment) {
+            Ok(pixels) => Some(pixels),
+            Err(error) => {
+                observer.detail(&format!("drawing the sphere on the CPU: {error}"));
+                None
+            }
+        });
+        let pixels = match drawn {
+            Some(pixels) => pixels,
+            None => on_processor(subject, environment)?,
+        };
+        Self::of(subject, environment, pixels)
+    }
+
+    fn of(subject: &Subject<'a>, environment: &'a Environment, pixels: Raster<LinearPixel>) -> Result<Self> {
+        let mask = pixels.pixels().iter().map(|pixel| pixel.coverage > 0.0).collect();
+        let reference = |p: &LinearPixel| if subject.truth.is_some() { p.truth } else { p.prediction };
+        let exposure = exposure_of(&Image::new(pixels.map(reference), mask)?);
+        Ok(Self { subject: *subject, environment, pixels, exposure })
+    }
+
+    /// The truth as it is shown.
+    pub(crate) fn truth(&self) -> Picture {
+        shown(&self.pixels, self.environment, self.exposure, |p| p.truth)
+    }
+
+    /// The prediction as it is shown, with the exposure of the truth if there is one.
+    pub(crate) fn prediction(&self) -> Picture {
+        shown(&self.pixels, self.environment, self.exposure, |p| p.prediction)
+    }
+
+    /// Truth, prediction and difference side by side, or the prediction alone.
+    pub(crate) fn figure(&self) -> Figure {
+        let (subject, pixels) = (&self.subject, &self.pixels);
+        let mut title = subject.title.to_owned();
+        if subject.truth.is_none() {
+            return Figure::of_panels(title, vec![Panel::picture("prediction", self.prediction())], "");
         }
-    });
-    let pixels = match on_device {
-        Some(pixels) => pixels,
-        None => on_processor(subject, environment)?,
-    };
-    figure(subject, environment, &pixels)
+        if let Some(psnr) = subject.psnr {
+            title.push_str(&format!(", PSNR {psnr:.1} dB"));
+        }
+        let wide = |rgb: [f32; 3]| rgb.map(f64::from);
+        let gap = |p: &LinearPixel| exposed_difference(wide(p.prediction), wide(p.truth), self.exposure);
+        let gaps: Vec<f64> = pixels.pixels().iter().map(gap).collect();
+        let inside: Vec<bool> = pixels.pixels().iter().map(|pixel| pixel.coverage == 1.0).collect();
+        let limit = round_limit(&gaps, &inside);
+        let colours = Picture::from_fn(pixels.width(), pixels.height(), |x, y| {
+            let i = y * pixels.width() + x;
+            let colour = Colormap::Diverging.at(0.5 + 0.5 * gaps[i] / limit);
+            mixed([255; 3], colour, f64::from(pixels.pixels()[i].coverage))
+        });
+        let panels = vec![
+            Panel::picture("truth", self.truth()),
+            Panel::picture("prediction", self.prediction()),
+            Panel::scaled("difference", colours, Scale::signed(limit)),
+        ];
+        let note = "Difference: prediction − truth in linear light, mean of R, G and B; 1 is white.";
+        Figure::of_panels(title, panels, note)
+    }
 }
 
 fn camera() -> Camera {
@@ -160,24 +216,25 @@ fn on_processor(subject: &Subject<'_>, environment: &Environment) -> Result<Rast
     let tables: Vec<&BrdfTable> = std::iter::once(subject.mean).chain(subject.truth).collect();
     let drawn = subject.truth.unwrap_or(subject.mean);
     let material = Material::new(drawn.clone(), &MaterialOptions { energy_conserving: false })?;
-    let steps: [f64; DIMENSIONS] = std::array::from_fn(|j| ROOT.powi(-1 - [0, 1, 2, 3, 4, 5][j]));
     let pixels: Vec<LinearPixel> = (0..SIZE * SIZE)
         .into_par_iter()
         .map(|i| {
             let mut random = SplitMix64::stream(1, i as u64);
-            let shift: [f64; DIMENSIONS] = std::array::from_fn(|_| random.next_unit());
+            // Each pixel has a shift of its own for the place of its rays, for the lamp and for the material.
+            let shifts: [[f64; 2]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| random.next_unit()));
             let mut sums = vec![[0.0; 3]; tables.len()];
             let mut hits = 0.0;
             for k in 0..RAYS {
-                let u: [f64; DIMENSIONS] =
-                    std::array::from_fn(|j| (shift[j] + (k + 1) as f64 * steps[j]).fract());
-                let place =
-                    [(i % SIZE) as f64 + u[0], (i / SIZE) as f64 + u[1]].map(|x| 2.0 * x / SIZE as f64 - 1.0);
+                let of = |shift: [f64; 2]| std::array::from_fn(|j| (shift[j] + k as f64 * STEPS[j]).fract());
+                let [within, by_lamp, by_material]: [[f64; 2]; 3] = shifts.map(of);
+                let corner = [(i % SIZE) as f64, (i / SIZE) as f64];
+                let place: [f64; 2] =
+                    std::array::from_fn(|j| 2.0 * (corner[j] + within[j]) / SIZE as f64 - 1.0);
                 let direction = ray(&camera, [place[0], -place[1]]);
                 let Some(normal) = meet(distance, &direction) else { continue };
                 hits += 1.0;
                 let Some(frame) = ShadingFrame::new(&normal, &-direction, 0.0) else { continue };
-                light(&frame, &lamp, &material, &tables, [u[2], u[3], u[4], u[5]], &mut sums);
+                light(&frame, &lamp, &material, &tables, [by_lamp, by_material], &mut sums);
             }
             let mean =
                 |sum: Option<&Rgb>| sum.map_or([0.0; 3], |sum| sum.map(|x| single(x / f64::max(hits, 1.0))));
@@ -199,62 +256,25 @@ fn light(
     lamp: &Lamp,
     material: &Material,
     tables: &[&BrdfTable],
-    [a, b, c, d]: [f64; 4],
+    [by_lamp, by_material]: [[f64; 2]; 2],
     sums: &mut [Rgb],
 ) {
-    let mut add = |w: &Vector3<f64>, [r, g, b, by_lamp]: [f64; 4], by_material: f64| {
-        let density = by_lamp + by_material;
+    let mut add = |w: &Vector3<f64>, [r, g, b, lamp_density]: [f64; 4], material_density: f64| {
+        let density = lamp_density + material_density;
         if density > 0.0 {
             frame.add_light(tables, w, [r, g, b].map(|x| x / density), sums);
         }
     };
-    let (w, texel) = lamp.draw([a, b]);
+    let (w, texel) = lamp.draw(by_lamp);
     if let Some((wi, wo)) = frame.directions(&w) {
-        let by_material = material.pdf(wi.map(single).into(), wo.map(single).into());
-        add(&w, texel, f64::from(by_material));
+        add(&w, texel, f64::from(material.pdf(wi.map(single).into(), wo.map(single).into())));
     }
     let wo = frame.to_viewer();
-    if let Some(drawn) = material.sample(wo.map(single).into(), single(c), single(d)) {
+    let [a, b] = by_material.map(single);
+    if let Some(drawn) = material.sample(wo.map(single).into(), a, b) {
         let w = frame.to_world(&Vector3::from(drawn.wi.map(f64::from)));
         add(&w, lamp.from(coordinates(&w)), f64::from(drawn.pdf));
     }
-}
-
-/// Lays the pictures out.
-fn figure(subject: &Subject<'_>, environment: &Environment, pixels: &Raster<LinearPixel>) -> Result<Figure> {
-    let mask: Vec<bool> = pixels.pixels().iter().map(|pixel| pixel.coverage > 0.0).collect();
-    let image = |of: fn(&LinearPixel) -> [f32; 3]| Image::new(pixels.map(of), mask.clone());
-    let reference = if subject.truth.is_some() { image(|p| p.truth)? } else { image(|p| p.prediction)? };
-    let exposure = exposure_of(&reference);
-    let show = |of: fn(&LinearPixel) -> [f32; 3]| shown(pixels, environment, exposure, of);
-    let mut panels = Vec::new();
-    let mut title = subject.title.to_owned();
-    let mut note = String::new();
-    if subject.truth.is_some() {
-        if let Some(psnr) = subject.psnr {
-            title.push_str(&format!(", PSNR {psnr:.1} dB"));
-        }
-        let wide = |rgb: [f32; 3]| rgb.map(f64::from);
-        let gaps: Vec<f64> = pixels
-            .pixels()
-            .iter()
-            .map(|p| exposed_difference(wide(p.prediction), wide(p.truth), exposure))
-            .collect();
-        let inside: Vec<bool> = pixels.pixels().iter().map(|pixel| pixel.coverage == 1.0).collect();
-        let limit = round_limit(&gaps, &inside);
-        let colours = Picture::from_fn(pixels.width(), pixels.height(), |x, y| {
-            let i = y * pixels.width() + x;
-            let colour = Colormap::Diverging.at(0.5 + 0.5 * gaps[i] / limit);
-            mixed([255; 3], colour, f64::from(pixels.pixels()[i].coverage))
-        });
-        panels.push(Panel::picture("truth", show(|p| p.truth)));
-        panels.push(Panel::picture("prediction", show(|p| p.prediction)));
-        panels.push(Panel::scaled("difference", colours, Scale::signed(limit)));
-        note.push_str("Difference: prediction − truth in linear light, mean of R, G and B; 1 is white.");
-    } else {
-        panels.push(Panel::picture("prediction", show(|p| p.prediction)));
-    }
-    Ok(Figure::of_panels(title, panels, note))
 }
 
 /// A picture of the sphere in front of the environment, with the tone curve of `render`.
@@ -386,7 +406,8 @@ mod tests {
         let studio = Environment::studio();
         for (truth, panels) in [(None, 1), (Some(&mean), 3)] {
             let subject = Subject { psnr: Some(30.0), ..subject(truth, &mean) };
-            let figure = figure(&subject, &studio, &on_processor(&subject, &studio).unwrap()).unwrap();
+            let pixels = on_processor(&subject, &studio).unwrap();
+            let figure = Portrait::of(&subject, &studio, pixels).unwrap().figure();
             assert_eq!(figure.rows[0].panels.len(), panels);
             assert_eq!(figure.title.contains("30.0 dB"), panels == 3);
         }

@@ -22,7 +22,7 @@ use clap::ValueEnum;
 use context::Outcome;
 pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
 pub(crate) use prior::Materials;
-pub(crate) use simulate::{BATCHES, Simulation, Trial};
+pub(crate) use simulate::{BATCHES, Simulation, Trained, Trial};
 
 /// Seconds for a fit on a lattice, its table, pictures and metrics.
 const LATTICE: f64 = 4.0;

@@ -64,7 +64,7 @@ struct Row {
 }
 
 impl From<Trained> for Row {
-    fn from(Trained { choice, samples, metrics, expected }: Trained) -> Self {
+    fn from(Trained { choice, samples, metrics, expected, .. }: Trained) -> Self {
         Self { choice, samples, metrics, expected }
     }
 }

@@ -9,8 +9,8 @@ use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, 
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::sample::InPlaneScan;
 use gpbrdf_core::{
-    Brdf, BrdfTable, Environment, FitOptions, HalfDiff, LatticeLayout, Layout, Metrics, Sample, SampleSet,
-    Symmetry, bake_mean, bake_sigma, fit,
+    Brdf, BrdfTable, Environment, FitOptions, HalfDiff, LatticeLayout, Layout, Metrics, Model, Sample,
+    SampleSet, Symmetry, bake_mean, bake_sigma, fit,
 };
 use serde_json::{Value, json};
 
@@ -44,6 +44,7 @@ pub(crate) struct Trained {
     /// How the directions were chosen.
     pub(crate) choice: &'static str,
     pub(crate) samples: usize,
+    pub(crate) model: Arc<Model>,
     pub(crate) metrics: Metrics,
     /// The root mean square error of `ln f` that the process of the samples expects; `None` for a process on a lattice.
     pub(crate) expected: Option<f64>,
@@ -135,7 +136,8 @@ impl Trial<'_> {
         let (mean, sigma) = (bake_mean(&model), bake_sigma(&model)?);
         let metrics = judge(self.truth, &model, &mean, Some(&sigma), self.environment)?;
         let expected = expected.transpose()?;
-        Ok((Trained { choice, samples: samples.len(), metrics, expected }, belief))
+        let model = Arc::new(model);
+        Ok((Trained { choice, samples: samples.len(), model, metrics, expected }, belief))
     }
 }
 

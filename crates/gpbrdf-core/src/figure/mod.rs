@@ -26,7 +26,7 @@ pub use axis::{Axis, AxisScale};
 pub use colormap::Colormap;
 pub use comparison::{slice_figure, sphere_figure};
 pub use panel::{Body, Panel, Scale};
-pub use picture::{Picture, Rgb8, write_rgba_png};
+pub use picture::{Picture, Rgb8, write_moving_png, write_rgba_png};
 pub use plot::{Curve, Plot};
 pub use scale::round_limit;
 pub use sheet::{Figure, FigureFormat, FigureOptions, Row};

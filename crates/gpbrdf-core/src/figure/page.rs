@@ -127,11 +127,11 @@ fn surroundings(row: &Row, guess: f64, page: f64) -> Vec<Surroundings> {
                 let widest = y.ticks.iter().map(|(_, label)| small(label).width).fold(0.0, f64::max);
                 around.left = LEADING * SMALL + CLOSE + widest + TICK + CLOSE;
             }
-            let last = x.ticks.last().map_or(0.0, |(_, label)| 0.5 * small(label).width);
-            around.right = (last - 0.5 * GAP).max(0.0);
-            if column + 1 == row.panels.len() {
-                around.right = last;
-            }
+            // Labels of ticks at the ends reach beyond the panel.
+            let beyond =
+                |tick: Option<&(f64, String)>| tick.map_or(0.0, |(_, label)| 0.5 * small(label).width);
+            around.left = around.left.max(beyond(x.ticks.first()));
+            around.right = beyond(x.ticks.last());
         }
         match &panel.body {
             Body::Picture { scale: Some(scale), .. } => around.right = around.right.max(scale_width(scale)),

@@ -76,6 +76,38 @@ pub fn write_rgba_png(
     write_png(out, width, height, png::ColorType::Rgba, pixels.as_flattened(), None)
 }
 
+/// Writes pictures of one size as an animated PNG that repeats without end, each shown for `milliseconds`.
+///
+/// # Errors
+/// Any error of `out`, or [`std::io::ErrorKind::Other`] for no picture, an empty one, or one of another size.
+pub fn write_moving_png(out: &mut impl Write, frames: &[Picture], milliseconds: u16) -> std::io::Result<()> {
+    let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
+    let size = frames.first().map_or((0, 0), |frame| (frame.width(), frame.height()));
+    if let Some(odd) = frames.iter().find(|frame| (frame.width(), frame.height()) != size) {
+        let found = format!("{} x {}", odd.width(), odd.height());
+        let what = format!("expected frames of {} x {} pixels, found one of {found}", size.0, size.1);
+        return Err(std::io::Error::other(what));
+    }
+    let mut encoder = png::Encoder::new(&mut *out, side(size.0)?, side(size.1)?);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_animated(side(frames.len())?, 0).map_err(failed)?;
+    encoder.set_frame_delay(milliseconds, 1000).map_err(failed)?;
+    let mut writer = encoder.write_header().map_err(failed)?;
+    for frame in frames {
+        writer.write_image_data(frame.pixels().as_flattened()).map_err(failed)?;
+    }
+    writer.finish().map_err(failed)?;
+    out.flush()
+}
+
+fn failed(error: png::EncodingError) -> std::io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => std::io::Error::other(other),
+    }
+}
+
 fn write_png(
     out: &mut impl Write,
     width: usize,
@@ -85,10 +117,6 @@ fn write_png(
     dots_per_inch: Option<f64>,
 ) -> std::io::Result<()> {
     let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
-    let failed = |error: png::EncodingError| match error {
-        png::EncodingError::IoError(error) => error,
-        other => std::io::Error::other(other),
-    };
     let mut encoder = png::Encoder::new(&mut *out, side(width)?, side(height)?);
     encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Eight);
@@ -132,6 +160,24 @@ mod tests {
         assert!(Picture::filled(0, 0, [0; 3]).write_png(&mut bytes).is_err());
         let folder = tempfile::tempdir().unwrap();
         assert!(picture.save_png(folder.path()).is_err());
+    }
+
+    #[test]
+    fn a_moving_picture_holds_its_frames_in_order() {
+        let frames: Vec<Picture> = [[9u8; 3], [80; 3], [200; 3]].map(|c| Picture::filled(6, 4, c)).to_vec();
+        let mut bytes = Vec::new();
+        write_moving_png(&mut bytes, &frames, 250).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        assert_eq!(reader.info().animation_control().unwrap().num_frames, 3);
+        let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
+        for frame in &frames {
+            reader.next_frame(&mut buffer).unwrap();
+            assert_eq!(buffer, frame.pixels().as_flattened());
+        }
+        assert!(write_moving_png(&mut bytes, &[], 250).is_err());
+        let odd = [Picture::filled(6, 4, [0; 3]), Picture::filled(4, 6, [0; 3])];
+        let error = write_moving_png(&mut bytes, &odd, 250).unwrap_err().to_string();
+        assert_eq!(error, "expected frames of 6 x 4 pixels, found one of 4 x 6");
     }
 
     #[test]
