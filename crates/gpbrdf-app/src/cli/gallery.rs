@@ -198,9 +198,9 @@ impl Gallery {
             PriorName::File(_) => "learned from other materials",
         };
         let note = format!(
-            "PSNR under the environment {psnr:.1} dB{0}; the 95 % interval covers {coverage:.1} % of all cells{0}. Curves: \
-             green channel in the plane of incidence, light at {INCIDENCE}°, mirror direction at +{INCIDENCE}°; truth in \
-             black, prediction in blue with its 95 % interval. Prior: {prior}.",
+            "PSNR under the environment {psnr:.1} dB{0}; the 95 % interval covers {coverage:.1} % of all cells{0}. \
+             Curves: green channel in the plane of incidence, light at {INCIDENCE}°, mirror direction at \
+             +{INCIDENCE}°; truth in black, prediction in blue with its 95 % interval. Prior: {prior}.",
             if shown.len() == 1 { "" } else { " on average" }
         );
         Figure { title, rows, note }

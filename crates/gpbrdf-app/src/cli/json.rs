@@ -4,8 +4,8 @@ use anyhow::Result;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// JSON with line ends. A PSNR that is no number of JSON is `null`, and a key `notes` names it: an infinite one of equal
-/// pictures is `"psnr_env": null` with the note `"metrics.psnr_env": "inf"`.
+/// JSON with line ends. A PSNR that is no number of JSON is `null`, and a key `notes` names it: an infinite one of
+/// equal pictures is `"psnr_env": null` with the note `"metrics.psnr_env": "inf"`.
 ///
 /// # Errors
 /// Those of the value.

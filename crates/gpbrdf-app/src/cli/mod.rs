@@ -48,7 +48,8 @@ struct Arguments {
     #[arg(help_heading = "General", short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
     /// Worker threads; all processors by default. Results do not depend on it.
-    #[arg(help_heading = "General", long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(help_heading = "General", long, global = true, value_name = "N")]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 

@@ -1,5 +1,5 @@
-//! Pictures of a sphere as `render` shows it: drawn on a device where there is one, else on the processor, by importance
-//! sampling on both.
+//! Pictures of a sphere as `render` shows it: drawn on a device where there is one, else on the processor, by
+//! importance sampling on both.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,8 +28,8 @@ const RAYS: usize = 16;
 /// Angle of view in radians, and the part of the frame that the sphere takes: those of `render`.
 const VIEW: f32 = 0.55;
 const FILL: f32 = 0.88;
-/// Steps of an additive recurrence that fills a square evenly: reciprocal powers of the root of `x^3 = x + 1`. M. Roberts,
-/// "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
+/// Steps of an additive recurrence that fills a square evenly: reciprocal powers of the root of `x^3 = x + 1`. M.
+/// Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
 const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
 
 /// What is shown.
@@ -319,8 +319,8 @@ fn background(environment: &Environment, [u, v]: [f64; 2]) -> Rgb {
     })
 }
 
-/// A radiance as it is shown: K. Narkowicz's fit (2015) to the curve of the Academy Color Encoding System, scaled to keep
-/// middle grey, and a gamma of 2.2.
+/// A radiance as it is shown: K. Narkowicz's fit (2015) to the curve of the Academy Color Encoding System, scaled to
+/// keep middle grey, and a gamma of 2.2.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255.5")]
 fn encoded(radiance: Rgb, exposure: f64) -> Rgb8 {
     radiance.map(|x| {

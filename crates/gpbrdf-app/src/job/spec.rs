@@ -32,7 +32,8 @@ const MAX_NODES: usize = 1 << 22;
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct ModelSpec {
     /// Nodes of the lattice along theta_h, theta_d and phi_d, for example 48x32x24.
-    #[arg(help_heading = "Sampling", long, value_name = "HxDxP", value_parser = parse_lattice, conflicts_with = "samples")]
+    #[arg(help_heading = "Sampling", long, value_name = "HxDxP", value_parser = parse_lattice)]
+    #[arg(conflicts_with = "samples")]
     pub(crate) lattice: Option<[usize; 3]>,
     /// Number of samples; the lattice is chosen near it. [default: 37616 on a lattice, 2000 off it]
     #[arg(help_heading = "Sampling", long, value_name = "N")]

@@ -14,8 +14,8 @@ use crate::figure::svg::svg;
 
 /// A figure: rows of panels between a title and a note.
 ///
-/// Texts may hold greek letters, which are set in italics. An underscore after one makes the next character a subscript;
-/// `_{...}` and `^{...}` make subscripts and superscripts anywhere.
+/// Texts may hold greek letters, which are set in italics. An underscore after one makes the next character a
+/// subscript; `_{...}` and `^{...}` make subscripts and superscripts anywhere.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Figure {
     /// The line above it; none if it is empty.
@@ -82,8 +82,8 @@ impl Figure {
     /// Writes the figure. The same figure gives the same bytes.
     ///
     /// # Errors
-    /// Any error of `out`; [`std::io::ErrorKind::Other`] with an [`Error::InvalidArgument`] for a width out of 20 to 2000
-    /// millimetres or a resolution out of 20 to 2400 dots per inch.
+    /// Any error of `out`; [`std::io::ErrorKind::Other`] with an [`Error::InvalidArgument`] for a width out of 20 to
+    /// 2000 millimetres or a resolution out of 20 to 2400 dots per inch.
     pub fn write(
         &self,
         out: &mut impl Write,
@@ -105,8 +105,8 @@ impl Figure {
     /// Writes the figure as a file, whose format is that of its name.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for another name than one that ends in .png, .svg or .pdf; [`Error::Io`] when the file
-    /// cannot be written; otherwise as [`Figure::write`].
+    /// [`Error::InvalidArgument`] for another name than one that ends in .png, .svg or .pdf; [`Error::Io`] when the
+    /// file cannot be written; otherwise as [`Figure::write`].
     pub fn save(&self, path: impl AsRef<Path>, options: &FigureOptions) -> Result<()> {
         let path = path.as_ref();
         let Some(format) = FigureFormat::of(path) else {
@@ -122,8 +122,8 @@ impl Figure {
     /// The figure as pixels.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] for a width out of 20 to 2000 millimetres, a resolution out of 20 to 2400 dots per inch,
-    /// or more than 400 million pixels.
+    /// [`Error::InvalidArgument`] for a width out of 20 to 2000 millimetres, a resolution out of 20 to 2400 dots per
+    /// inch, or more than 400 million pixels.
     pub fn picture(&self, options: &FigureOptions) -> Result<Picture> {
         bitmap(&lay_out(self, options.points()?), options.dots_per_inch / 72.0)
     }

@@ -72,13 +72,15 @@ pub(crate) struct Render {
     #[arg(help_heading = "Scene", long, value_enum, default_value = "mis")]
     sampling: SamplingName,
     /// Samples per pixel.
-    #[arg(help_heading = "Scene", long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=1 << 20))]
+    #[arg(help_heading = "Scene", long, value_name = "N", default_value_t = 64)]
+    #[arg(value_parser = value_parser!(u32).range(1..=1 << 20))]
     spp: u32,
     /// Columns and rows of the picture.
     #[arg(help_heading = "Scene", long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
     size: [u32; 2],
     /// Turn of the camera to the right and up, degrees.
-    #[arg(help_heading = "Scene", long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_pair, allow_hyphen_values = true)]
+    #[arg(help_heading = "Scene", long, value_name = "AZIMUTH,ELEVATION")]
+    #[arg(value_parser = parse_pair, allow_hyphen_values = true)]
     orbit: Option<[f32; 2]>,
     /// Parallel rays; a unit sphere touches the frame, as in the image metrics.
     #[arg(help_heading = "Scene", long)]
