@@ -68,10 +68,14 @@ impl Plot {
 
     /// Draws bands, grid and curves into a box.
     pub(super) fn draw(&self, page: &mut Drawing, [left, top]: [f64; 2], size: [f64; 2], axes: &[Ruled; 2]) {
-        let place = |x: f64, y: f64| {
+        let at = |x: f64, y: f64| {
             let (across, up) = (axes[0].part(x)?, axes[1].part(y)?);
-            // What is out of the frame is drawn on its edge.
-            Some([left + size[0] * across.clamp(0.0, 1.0), top + size[1] * (1.0 - up.clamp(0.0, 1.0))])
+            Some([left + size[0] * across, top + size[1] * (1.0 - up)])
+        };
+        let frame = [[left, left + size[0]], [top, top + size[1]]];
+        // A band that leaves the frame ends at its edge.
+        let held = |point: Option<[f64; 2]>| {
+            point.map(|p| std::array::from_fn(|axis| p[axis].clamp(frame[axis][0], frame[axis][1])))
         };
         for (value, _) in &axes[0].ticks {
             let Some(t) = axes[0].part(*value) else { continue };
@@ -84,20 +88,22 @@ impl Plot {
             page.line(vec![[left, y], [left + size[0], y]], GRID, HAIRLINE);
         }
         for (i, curve) in self.curves.iter().enumerate() {
-            let low = curve.band.iter().filter_map(|b| place(b.0, b.1));
-            let high = curve.band.iter().rev().filter_map(|b| place(b.0, b.2));
+            let low = curve.band.iter().filter_map(|b| held(at(b.0, b.1)));
+            let high = curve.band.iter().rev().filter_map(|b| held(at(b.0, b.2)));
             let ring: Vec<[f64; 2]> = low.chain(high).collect();
             if ring.len() > 2 {
                 page.area(ring, lightened(self.colour(i)));
             }
         }
         for (i, curve) in self.curves.iter().enumerate() {
-            let points: Vec<[f64; 2]> = curve.points.iter().filter_map(|&(x, y)| place(x, y)).collect();
-            if points.len() > 1 {
-                page.line(points.clone(), self.colour(i), LINE);
+            let points: Vec<[f64; 2]> = curve.points.iter().filter_map(|&(x, y)| at(x, y)).collect();
+            for line in clipped(&points, &frame) {
+                page.line(line, self.colour(i), LINE);
             }
             if points.len() <= MOST_MARKS {
-                points.into_iter().for_each(|at| self.mark(page, i, at));
+                let inside =
+                    |p: &&[f64; 2]| (0..2).all(|axis| held(Some(**p)).is_some_and(|h| h[axis] == p[axis]));
+                points.iter().filter(inside).for_each(|&at| self.mark(page, i, at));
             }
         }
     }
@@ -161,7 +167,56 @@ impl Plot {
     }
 }
 
+/// The parts of a line that are in a box, which is given by its ends along each axis. Y. Liang and B. Barsky, "A New
+/// Concept and Method for Line Clipping" (1984).
+fn clipped(points: &[[f64; 2]], frame: &[[f64; 2]; 2]) -> Vec<Vec<[f64; 2]>> {
+    let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
+    for pair in points.windows(2) {
+        let step: [f64; 2] = std::array::from_fn(|axis| pair[1][axis] - pair[0][axis]);
+        let (mut enters, mut leaves) = (0.0f64, 1.0f64);
+        for (axis, [low, high]) in frame.iter().enumerate() {
+            let [a, b] = [low, high].map(|end| (end - pair[0][axis]) / step[axis]);
+            if step[axis] != 0.0 {
+                (enters, leaves) = (enters.max(a.min(b)), leaves.min(a.max(b)));
+            } else if !(*low..=*high).contains(&pair[0][axis]) {
+                leaves = -1.0;
+            }
+        }
+        if enters > leaves {
+            continue;
+        }
+        // Ends stay as they are, so that lines are known to go on.
+        let on = |t: f64| match t {
+            0.0 => pair[0],
+            1.0 => pair[1],
+            _ => std::array::from_fn(|axis| pair[0][axis] + t * step[axis]),
+        };
+        match lines.last_mut() {
+            Some(line) if enters == 0.0 && line.last() == Some(&pair[0]) => line.push(on(leaves)),
+            _ => lines.push(vec![on(enters), on(leaves)]),
+        }
+    }
+    lines
+}
+
 /// A colour mixed with white.
 fn lightened(colour: Rgb8) -> Rgb8 {
     colour.map(|c| u8::try_from((u16::from(c) + 3 * 255) / 4).unwrap_or(u8::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_at_the_frame_and_go_on_where_they_come_back() {
+        let frame = [[0.0, 10.0], [0.0, 4.0]];
+        let inside = [[0.0, 1.0], [5.0, 4.0], [10.0, 0.0]];
+        assert_eq!(clipped(&inside, &frame), [inside.to_vec()]);
+        let peak = [[0.0, 0.0], [2.0, 8.0], [4.0, 0.0], [6.0, 2.0]];
+        let expected = [vec![[0.0, 0.0], [1.0, 4.0]], vec![[3.0, 4.0], [4.0, 0.0], [6.0, 2.0]]];
+        assert_eq!(clipped(&peak, &frame), expected);
+        assert!(clipped(&[[0.0, 5.0], [10.0, 5.0]], &frame).is_empty());
+        assert!(clipped(&[[1.0, 1.0]], &frame).is_empty());
+    }
 }
