@@ -22,6 +22,8 @@ use crate::reproduce::{Trained, Trial};
 const INCIDENCE: i32 = 45;
 /// The largest polar angle of their views, degrees.
 const STEEPEST: i32 = 80;
+/// The smallest value on the axis of the curves, 1/sr: what models add to values before the logarithm.
+const DARKEST: f64 = 1e-3;
 /// The most materials: with more the pictures would be a few millimetres wide.
 const MOST: usize = 12;
 /// How measurements are divided into stages: a part of them, then all.
@@ -158,13 +160,17 @@ impl Gallery {
         let (psnr, coverage) = (mean(|one| one.psnr), mean(|one| one.coverage));
         // Ends of the axis by the truth, so that they stay while measurements are added.
         let values =
-            shown.iter().flat_map(|one| one.curves[0].points.iter().map(|p| p.1)).filter(|&f| f > 0.0);
+            shown.iter().flat_map(|one| one.curves[0].points.iter().map(|p| p.1)).map(|f| f.max(DARKEST));
         let (low, high) = values.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), f| (l.min(f), h.max(f)));
         let limits =
-            (low < high).then(|| [power_of_ten(0.5 * low, f64::floor), power_of_ten(2.0 * high, f64::ceil)]);
-        let steepest = f64::from(STEEPEST);
+            (low < high).then(|| [power_of_ten(low, f64::floor), power_of_ten(2.0 * high, f64::ceil)]);
+        let (steepest, mirror) = (f64::from(STEEPEST), f64::from(INCIDENCE));
         let plot = |one: &Shown| Plot {
-            x: Axis { limits: Some([-steepest, steepest]), ..Axis::linear("θ_o (degrees)") },
+            x: Axis {
+                limits: Some([-steepest, steepest]),
+                ticks: vec![-mirror, 0.0, mirror],
+                ..Axis::linear("θ_o (degrees)")
+            },
             y: Axis { limits, ..Axis::logarithmic("f (1/sr)") },
             curves: one.curves.to_vec(),
             legend: false,
