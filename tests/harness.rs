@@ -148,8 +148,8 @@ pub(crate) fn data_dir() -> Option<PathBuf> {
     None
 }
 
-/// A metric by its name; `"inf"` is infinite.
+/// A metric by its name; one that is infinite is `null`, with a note.
 pub(crate) fn metric(report: &Value, name: &str) -> f64 {
-    let value = &report["metrics"][name];
-    value.as_f64().or_else(|| value.as_str()?.parse().ok()).unwrap_or_else(|| panic!("no {name}: {report:#}"))
+    let note = || report["notes"][&format!("metrics.{name}")].as_str()?.parse().ok();
+    report["metrics"][name].as_f64().or_else(note).unwrap_or_else(|| panic!("no {name}: {report:#}"))
 }

@@ -47,7 +47,7 @@ fn writes_everything_and_reports_it() {
         assert!(value.as_f64().unwrap() > 0.0, "{hyper}");
     }
     let seconds = report["seconds"].as_object().unwrap();
-    let stages = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "write"];
+    let stages = ["load", "sample", "fit", "bake_mean", "bake_sigma", "metrics", "render", "write"];
     let sum: f64 = stages.iter().map(|stage| seconds[*stage].as_f64().unwrap()).sum();
     let total = seconds["total"].as_f64().unwrap();
     assert!(sum <= total + 1e-9 && sum > 0.5 * total, "{seconds:?}");

@@ -252,3 +252,59 @@ fn info_and_materials_know_everything() {
     cli.write("lambert", "theta_i,phi_i,theta_o,phi_o,f\n10,0,20,0,1.5\n");
     assert_eq!(cli.json(&["info", "lambert", "--json"])["kind"], "samples CSV");
 }
+
+#[test]
+fn shells_and_man_know_every_command() {
+    let cli = Cli::new();
+    let commands = ["bake", "gallery", "reproduce", "completions"];
+    for (shell, mark) in
+        [("bash", "complete -F"), ("zsh", "#compdef gpbrdf-cli"), ("fish", "complete -c gpbrdf-cli")]
+    {
+        let script = cli.ok(&["completions", shell]);
+        assert!(script.contains(mark) && commands.iter().all(|command| script.contains(command)), "{shell}");
+        assert!(script.contains("cherry-235") || script.contains("figures"), "{shell}");
+    }
+    cli.ok(&["man", "-o", "pages"]);
+    let pages = cli.names("pages");
+    assert!(pages.contains(&"gpbrdf-cli.1".to_owned()), "{pages:?}");
+    for command in commands {
+        let page = String::from_utf8(cli.read(format!("pages/gpbrdf-cli-{command}.1"))).unwrap();
+        assert!(page.contains(".TH") && page.contains("Examples:"), "{command}: {page}");
+    }
+}
+
+#[test]
+fn help_is_in_groups_and_shows_examples_and_defaults() {
+    let cli = Cli::new();
+    let help = cli.ok(&["bake", "--help"]);
+    let place = |text: &str| help.find(text).unwrap_or_else(|| panic!("no {text}: {help}"));
+    let groups = ["Input:", "Sampling:", "Model:", "Output:", "General:", "Examples:"];
+    assert!(groups.windows(2).all(|pair| place(pair[0]) < place(pair[1])), "{help}");
+    assert!(help.contains("[default: 178]") && help.contains("[default: cherry-235]"), "{help}");
+}
+
+#[test]
+fn a_gallery_shows_all_its_materials_and_can_move() {
+    let cli = Cli::new();
+    let out = cli.ok(&["gallery", "lambert", "ward", "--count", "4", "--prior", "none", "-o", "g.svg"]);
+    assert_eq!(out.matches("4 samples, PSNR").count(), 2, "{out}");
+    let svg = String::from_utf8(cli.read("g.svg")).unwrap();
+    assert_eq!(svg.matches("<image").count(), 4);
+    for text in [">lambert<", ">ward<", "4 planned measurements", "Prior: none", ">prediction<"] {
+        assert!(svg.contains(text), "{text}");
+    }
+    cli.ok(&["gallery", "lambert", "--count", "3,4", "--prior", "none", "--dpi", "60", "-o", "g.png", "-q"]);
+    let png = cli.read("g.png");
+    assert!(png.windows(4).any(|chunk| chunk == b"acTL") && png.windows(4).any(|chunk| chunk == b"fdAT"));
+    for (arguments, message) in [
+        (
+            &["gallery", "ward", "--count", "4,6", "-o", "g.pdf"][..],
+            "\"g.pdf\": expected .png for several numbers of --count",
+        ),
+        (&["gallery", "ward", "-o", "g.gif"], "\"g.gif\": expected a name that ends in .png, .svg or .pdf"),
+    ] {
+        assert_eq!(cli.fails(arguments), message);
+    }
+    let found = cli.fails(&["gallery", "red_plastic"]);
+    assert!(found.ends_with("found neither; did you mean the built-in material red-plastic?"), "{found}");
+}

@@ -29,6 +29,10 @@ fn a_comparison_has_its_figures_in_json_and_in_the_picture() {
     assert!(report["ssim"].as_f64().unwrap() > 0.5 && report["width"] == 48, "{out}");
     assert!(report["pixel_difference"]["median"].as_f64().unwrap() < 0.5, "{out}");
     assert!(cli.read("a.png").starts_with(b"\x89PNG"));
+    cli.ok(&[&small[..], &["--compare", "-q", "-o", "a.svg", "-o", "a.pdf", "--width", "85"]].concat());
+    let svg = String::from_utf8(cli.read("a.svg")).unwrap();
+    assert!(svg.contains("width=\"85mm\"") && svg.contains("predicted from") && svg.contains("difference"));
+    assert!(cli.read("a.pdf").starts_with(b"%PDF"));
     let several = ["--show", "sigma", "-o", "s.png", "-o", "s.exr", "-q"];
     cli.ok(&[&small[..], &several].concat());
     assert!(cli.read("s.exr").starts_with(&[0x76, 0x2f, 0x31, 0x01]));
@@ -48,8 +52,8 @@ fn wrong_requests_are_refused_and_leave_nothing() {
         (&["render", "--scene", "torus"][..], "expected sphere, knot, box or a mesh file, found \"torus\""),
         (&["render", "--scene", "bad.obj"], "OBJ file \"bad.obj\": expected"),
         (&["render", "--scene", "missing.obj"], "cannot read \"missing.obj\""),
-        (&["render", "-o", "a.jpg"], "ends in .png or .exr"),
-        (&["render", "--compare", "-o", "a.exr"], "expected a .png file"),
+        (&["render", "-o", "a.jpg"], "ends in .png, .svg, .pdf or .exr"),
+        (&["render", "--compare", "-o", "a.exr"], "expected .png, .svg or .pdf"),
         (&["render", "--size", "99999999x2"], "found 99999999 x 2"),
         (&["render", "--light", "directional", "--light-at", "0,0,0"], "expected a direction"),
         (&["render", "--env", "bad.obj"], "environment map"),

@@ -120,7 +120,10 @@ fn names_of_outputs_choose_their_format() {
             "\"t.ply\": expected a name that ends in .binary, .exr, .bsdf, .csv, .dds, .ktx2, .npy or .bin, \
              found .ply",
         ),
-        (&["slice", "lambert", "-o", "t.jpg"], "\"t.jpg\": expected a name that ends in .png or .exr"),
+        (
+            &["slice", "lambert", "-o", "t.jpg"],
+            "\"t.jpg\": expected a name that ends in .png, .svg, .pdf or .exr",
+        ),
         (&["slice", "lambert", "--phi-d", "nan"], "--phi-d: expected a finite number, found NaN"),
         (
             &["convert", "s.csv", "t.binary"],

@@ -14,25 +14,31 @@ use crate::job::{Run, Stage};
 use crate::output::OutputFolder;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli bake satin_purple.bsdf -o out",
+    "\n  gpbrdf-cli bake measured.csv --values factor --prior none",
+    "\n  gpbrdf-cli bake cherry-235 --samples 3000 --figures pdf --width 85",
+))]
 pub(crate) struct Bake {
     /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
     /// standard input.
     #[arg(default_value = "cherry-235")]
     input: PathBuf,
-    /// Folder for the outputs; made if need be.
-    #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-out")]
-    output: PathBuf,
     #[command(flatten)]
     making: Making,
+    /// Folder for the outputs; made if need be.
+    #[arg(help_heading = "Output", short, long, value_name = "DIR", default_value = "gpbrdf-out")]
+    output: PathBuf,
     /// Write the baked table as a 3-D texture, too, in the order of the lookup shader: .dds, .ktx2, .npy or .bin.
     /// May be repeated.
-    #[arg(long, value_name = "FILE", value_parser = texture_path)]
+    #[arg(help_heading = "Output", long, value_name = "FILE", value_parser = texture_path)]
     texture: Vec<PathBuf>,
     /// Write no pictures.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     no_images: bool,
     /// Print the report as JSON on standard output, and nothing else there.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     json: bool,
 }
 

@@ -9,10 +9,15 @@ use gpbrdf_core::judge::{CheckOptions, MaterialCheck};
 use serde::Serialize;
 
 use super::input::open;
+use super::json::to_json;
 use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli check satin_purple.bsdf --strict",
+))]
 pub(crate) struct Check {
     /// A table, measurement or model file, or a built-in material.
     input: PathBuf,
@@ -59,7 +64,7 @@ impl Check {
         if self.json {
             let checked =
                 Checked { input: source.origin(), energy_conserving: self.energy_conserving, check };
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&checked)?))?;
+            terminal.print(&to_json(&checked)?)?;
         } else {
             terminal.summary(&format!("{}\n{}", source.origin(), lines(&check).join("\n")))?;
         }

@@ -11,6 +11,11 @@ use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli convert satin_purple.bsdf satin_purple.binary",
+    "\n  gpbrdf-cli convert model.safetensors table.dds",
+))]
 pub(crate) struct Convert {
     /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
     /// standard input.
@@ -21,13 +26,13 @@ pub(crate) struct Convert {
     /// .bin (texture), or with --format any name.
     output: PathBuf,
     /// What to write [default: what the name of the output says]
-    #[arg(long, value_enum, value_name = "FORMAT")]
+    #[arg(help_heading = "Output", long, value_enum, value_name = "FORMAT")]
     format: Option<Written>,
     /// Write colours of an RGL file as linear sRGB, for RGB variants of Mitsuba 3; spectra are for all others.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     rgb: bool,
     /// Number of samples of a .csv from a source that can be evaluated at any direction.
-    #[arg(long, value_name = "N", default_value_t = OutputOptions::default().samples)]
+    #[arg(help_heading = "Output", long, value_name = "N", default_value_t = OutputOptions::default().samples)]
     samples: usize,
 }
 

@@ -11,11 +11,17 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::input::{environment, open};
+use super::json::to_json;
 use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{judge, metric_lines};
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli eval model.safetensors satin_purple.bsdf",
+    "\n  gpbrdf-cli eval out/table.binary measured.binary --json",
+))]
 pub(crate) struct Eval {
     /// Model, table or measurement to judge, or a built-in material.
     prediction: PathBuf,
@@ -27,7 +33,7 @@ pub(crate) struct Eval {
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
     /// Print JSON on standard output, and nothing else there.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     json: bool,
 }
 
@@ -99,6 +105,6 @@ impl Eval {
 
     fn print(&self, terminal: &Terminal, prediction: &Source, truth: &Source, metrics: Value) -> Result<()> {
         let evaluation = Evaluation { prediction: prediction.origin(), truth: truth.origin(), metrics };
-        terminal.print(&format!("{}\n", serde_json::to_string_pretty(&evaluation)?))
+        terminal.print(&to_json(&evaluation)?)
     }
 }

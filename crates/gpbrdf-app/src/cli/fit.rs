@@ -13,19 +13,24 @@ use super::terminal::Terminal;
 use crate::job::{Job, ModelSpec, Report, Run, Stage};
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli fit measured.csv -o material.safetensors",
+    "\n  gpbrdf-cli fit red-plastic --lattice 24x16x12 --kernel matern52",
+))]
 pub(crate) struct Fit {
     /// A measurement or table file, the name of a built-in material, or - for measured samples from standard
     /// input.
     input: PathBuf,
-    /// Model file to write.
-    #[arg(short, long, value_name = "FILE", default_value = "model.safetensors")]
-    output: PathBuf,
     #[command(flatten)]
     reading: Reading,
     #[command(flatten)]
     model: ModelSpec,
+    /// Model file to write.
+    #[arg(help_heading = "Output", short, long, value_name = "FILE", default_value = "model.safetensors")]
+    output: PathBuf,
     /// Print the report as JSON on standard output, and nothing else there.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     json: bool,
 }
 

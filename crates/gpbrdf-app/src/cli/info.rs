@@ -9,17 +9,22 @@ use gpbrdf_core::{Content, detect_symmetry};
 use serde_json::{Value, json};
 
 use super::input::open_quietly;
+use super::json::to_json;
 use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli info model.safetensors --json",
+))]
 pub(crate) struct Info {
     /// A file, the name of a built-in material, or - for measured samples from standard input.
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
     /// Print JSON.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     json: bool,
 }
 
@@ -66,7 +71,7 @@ impl Info {
         if self.json {
             let all = json!({ "name": source.name, "kind": source.kind, "description": source.description,
                 "sha256": source.sha256, "details": details });
-            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
+            return terminal.print(&to_json(&all)?);
         }
         let mut text = format!("{}: {}\n", source.name, source.kind);
         if !source.description.is_empty() {

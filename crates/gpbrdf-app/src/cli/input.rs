@@ -53,10 +53,22 @@ pub(crate) fn open_quietly(input: &Path, reading: Reading) -> Result<Source> {
         }
         return Ok(Source::built_in(material.name)?);
     }
+    let near = near_name(&input.to_string_lossy())
+        .map_or_else(String::new, |name| format!("; did you mean the built-in material {name}?"));
     bail!(
-        "\"{}\": expected a file or a built-in material (`gpbrdf-cli materials` lists them), found neither",
+        "\"{}\": expected a file or a built-in material (`gpbrdf-cli materials` lists them), found neither{near}",
         input.display()
     );
+}
+
+/// The built-in material whose name is most like this one, if any is much like it.
+pub(crate) fn near_name(name: &str) -> Option<&'static str> {
+    const ALIKE: f64 = 0.8;
+    let wanted = name.to_lowercase().replace(['_', ' '], "-");
+    let alike =
+        materials().iter().map(|material| (strsim::jaro_winkler(&wanted, material.name), material.name));
+    let nearest = alike.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (nearest.0 >= ALIKE).then_some(nearest.1)
 }
 
 /// Whether a name stands for standard input.
@@ -81,4 +93,23 @@ pub(crate) fn environment(path: Option<&Path>) -> Result<Environment> {
         Some(path) => read_environment(path)?,
         None => Environment::studio(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::near_name;
+
+    #[test]
+    fn a_mistyped_name_is_found_and_a_file_is_not() {
+        for (typed, meant) in [
+            ("cherry", Some("cherry-235")),
+            ("red_plastic", Some("red-plastic")),
+            ("Blue Ruber", Some("blue-rubber")),
+            ("cook-torance", Some("cook-torrance")),
+            ("measured/2026-03.csv", None),
+            ("", None),
+        ] {
+            assert_eq!(near_name(typed), meant, "{typed}");
+        }
+    }
 }

@@ -13,6 +13,10 @@ use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli learn weights.csv scans/*.bsdf --name mine -o mine.safetensors",
+))]
 pub(crate) struct Learn {
     /// Materials: measurement, table or model files, built-in materials, or tables of Neural BRDF weights, which
     /// hold many. A file replaces Neural BRDF weights of the same name. Scattered measurements are fitted first.

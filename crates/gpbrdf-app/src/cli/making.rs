@@ -7,20 +7,24 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::brdf::N_CELLS;
-use gpbrdf_core::figure::{Picture, SliceOptions, slice_figure, sphere_figure};
+use gpbrdf_core::figure::{Figure, FigureOptions, SliceOptions, slice_figure};
 use gpbrdf_core::formats::{
     ExrChannels, ExrPart, TextureFormat, texture_files, write_merl_to, write_table_exr_to,
 };
-use gpbrdf_core::judge::render_env;
 use gpbrdf_core::{Brdf, BrdfTable, Environment, SigmaTable, Source};
 
+use super::figure_args::{FigureSize, title};
 use super::input::environment;
+use super::json::to_json;
 use super::reading::Reading;
-use crate::job::{Backend, Baked, Baking, Job, Judging, ModelSpec, Outcome, Report, Run, Stage, Truth};
+use crate::job::{
+    Backend, Baked, Baking, FigureKind, Job, Judging, ModelSpec, Outcome, Portrait, Report, Run, Stage,
+    Subject, Truth,
+};
 use crate::output::OutputFolder;
 
-/// Pixels along each side of the pictured spheres.
-const PICTURE_SIZE: usize = 160;
+/// Rows and columns of the slices that are drawn.
+const SLICE_SIZE: usize = 512;
 
 /// How to make a material out of a source.
 #[derive(Args, Debug)]
@@ -30,17 +34,22 @@ pub(super) struct Making {
     #[command(flatten)]
     pub(super) model: ModelSpec,
     /// Where to bake.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(help_heading = "Output", long, value_enum, default_value_t)]
     pub(super) backend: Backend,
     /// Environment map (.hdr or .exr, latitude-longitude) of the image metrics instead of the built-in one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Output", long, value_name = "FILE")]
     pub(super) env: Option<PathBuf>,
     /// Do not compare with the truth; its table is not computed.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub(super) no_metrics: bool,
     /// Do not bake the standard deviation.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     pub(super) no_sigma: bool,
+    /// The kind of file of the figures of slice and sphere.
+    #[arg(help_heading = "Output", long, value_enum, value_name = "KIND", default_value_t)]
+    pub(super) figures: FigureKind,
+    #[command(flatten)]
+    pub(super) figure_size: FigureSize,
 }
 
 /// A file of a material.
@@ -54,9 +63,9 @@ pub(super) enum Product {
     Model,
     /// Hyper-parameters, times and metrics, report.json.
     Report,
-    /// Truth, prediction and difference of a slice, slice.png.
+    /// Truth, prediction and difference of a slice, slice.png (or .svg, .pdf with --figures).
     Slice,
-    /// Truth, prediction and difference of a sphere, sphere.png.
+    /// Truth, prediction and difference of a sphere, sphere.png (or .svg, .pdf with --figures).
     Sphere,
     /// The texture of the lookup shader, table.dds.
     Dds,
@@ -74,14 +83,22 @@ impl Product {
         [Self::Binary, Self::Exr, Self::Model, Self::Report, Self::Slice, Self::Sphere];
 
     /// The name of its file.
-    pub(super) fn file_name(self) -> &'static str {
+    pub(super) fn file_name(self, figures: FigureKind) -> String {
+        match self {
+            Self::Slice | Self::Sphere => format!("{}.{}", self.stem(), figures.extension()),
+            _ => self.stem().to_owned(),
+        }
+    }
+
+    /// The name of its file, without the extension of a figure.
+    fn stem(self) -> &'static str {
         match self {
             Self::Binary => "table.binary",
             Self::Exr => "table.exr",
             Self::Model => "model.safetensors",
             Self::Report => "report.json",
-            Self::Slice => "slice.png",
-            Self::Sphere => "sphere.png",
+            Self::Slice => "slice",
+            Self::Sphere => "sphere",
             Self::Dds => "table.dds",
             Self::Ktx2 => "table.ktx2",
             Self::Npy => "table.npy",
@@ -94,7 +111,7 @@ impl Product {
     }
 
     fn texture_format(self) -> Option<TextureFormat> {
-        TextureFormat::of(Path::new(self.file_name()))
+        TextureFormat::of(Path::new(self.stem()))
     }
 }
 
@@ -137,11 +154,27 @@ impl Making {
             judging: if self.no_metrics { Judging::Nothing } else { Judging::All(environment) },
             ..Job::new(source, &self.model)
         })?;
+        let title = title(&source.name, &outcome.fitted.model);
+        let drawn = match &outcome.baked {
+            Some(baked) if wanted.products.contains(&Product::Sphere) => {
+                let subject = Subject {
+                    title: &title,
+                    truth: outcome.truth.as_deref(),
+                    mean: &baked.mean,
+                    sigma: baked.sigma.as_deref(),
+                    psnr: outcome.metrics.as_ref().map(|metrics| metrics.images.psnr_env),
+                };
+                let observer = run.observer();
+                let draw = || Ok(Portrait::new(&subject, environment, self.backend, &*observer)?.figure());
+                Some(run.stage(Stage::Render, draw)?)
+            }
+            _ => None,
+        };
         let mut outputs = run.stage(Stage::Write, || {
-            let mut outputs = Outputs::new(wanted)?;
+            let mut outputs = Outputs::new(wanted, self)?;
             outputs.write_model(&outcome)?;
             outputs.write_textures(&outcome)?;
-            outputs.write_pictures(source, &outcome, environment)?;
+            outputs.write_figures(&title, &outcome, drawn.as_ref())?;
             Ok(outputs)
         })?;
         let report = outputs.write_report(Report::new(&outcome, run.seconds()))?;
@@ -153,19 +186,25 @@ impl Making {
 /// The files of a run, which appear together at its end.
 struct Outputs<'a> {
     wanted: Wanted<'a>,
+    figures: FigureKind,
+    figure_size: FigureOptions,
     folder: OutputFolder,
     files: Vec<AtomicFile>,
 }
 
 impl<'a> Outputs<'a> {
-    fn new(wanted: Wanted<'a>) -> Result<Self> {
-        Ok(Self { folder: OutputFolder::create(wanted.folder)?, wanted, files: Vec::new() })
+    fn new(wanted: Wanted<'a>, making: &Making) -> Result<Self> {
+        let (figures, figure_size) = (making.figures, making.figure_size.into());
+        let folder = OutputFolder::create(wanted.folder)?;
+        Ok(Self { folder, wanted, figures, figure_size, files: Vec::new() })
     }
 
     /// Starts the file of a product, if it is wanted.
     fn start(&self, product: Product) -> Result<Option<AtomicFile>> {
         let is_wanted = self.wanted.products.contains(&product);
-        Ok(is_wanted.then(|| AtomicFile::create(self.folder.join(product.file_name()))).transpose()?)
+        Ok(is_wanted
+            .then(|| AtomicFile::create(self.folder.join(&product.file_name(self.figures))))
+            .transpose()?)
     }
 
     /// Adds the file of a product, which `write` fills, if it is wanted.
@@ -200,7 +239,7 @@ impl<'a> Outputs<'a> {
         let Some(baked) = &outcome.baked else { return Ok(()) };
         let named = self.wanted.textures.iter().map(|path| Ok((path.clone(), texture_format(path)?)));
         let products = self.wanted.products.iter().filter_map(|product| {
-            Some(Ok((self.folder.join(product.file_name()), product.texture_format()?)))
+            Some(Ok((self.folder.join(&product.file_name(self.figures)), product.texture_format()?)))
         });
         for texture in named.chain(products).collect::<Result<Vec<_>>>()? {
             let (path, format) = texture;
@@ -209,22 +248,17 @@ impl<'a> Outputs<'a> {
         Ok(())
     }
 
-    /// Adds a picture of one slice and one of spheres.
-    fn write_pictures(
-        &mut self,
-        source: &Source,
-        outcome: &Outcome,
-        environment: &Environment,
-    ) -> Result<()> {
+    /// Adds the figures of one slice and of a sphere.
+    fn write_figures(&mut self, title: &str, outcome: &Outcome, sphere: Option<&Figure>) -> Result<()> {
         let Some(baked) = &outcome.baked else { return Ok(()) };
-        let truth = outcome.truth.as_deref();
-        let psnr = outcome.metrics.as_ref().map(|metrics| metrics.images.psnr_env);
+        let (kind, size) = (self.figures.into(), self.figure_size);
+        let truth = outcome.truth.as_deref().map(|truth| truth as &dyn Brdf);
         self.add(Product::Slice, |file| {
-            Ok(slice_picture(&source.name, truth, &baked.mean)?.write_png(file)?)
+            let options = SliceOptions { size: SLICE_SIZE, ..SliceOptions::default() };
+            Ok(slice_figure(title, truth, &*baked.mean, &options)?.write(file, kind, &size)?)
         })?;
-        self.add(Product::Sphere, |file| {
-            Ok(sphere_picture(&source.name, truth, &baked.mean, environment, psnr)?.write_png(file)?)
-        })
+        let Some(sphere) = sphere else { return Ok(()) };
+        self.add(Product::Sphere, |file| Ok(sphere.write(file, kind, &size)?))
     }
 
     /// Adds the report, which names all files, itself too.
@@ -233,13 +267,10 @@ impl<'a> Outputs<'a> {
             .wanted
             .products
             .contains(&Product::Report)
-            .then(|| self.folder.join(Product::Report.file_name()));
+            .then(|| self.folder.join(&Product::Report.file_name(self.figures)));
         let paths = self.files.iter().map(AtomicFile::target).chain(own.as_deref());
         report.outputs = paths.map(|path| path.display().to_string()).collect();
-        self.add(Product::Report, |file| {
-            serde_json::to_writer_pretty(&mut *file, &report)?;
-            Ok(file.write_all(b"\n")?)
-        })?;
+        self.add(Product::Report, |file| Ok(file.write_all(to_json(&report)?.as_bytes())?))?;
         Ok(report)
     }
 
@@ -292,21 +323,4 @@ fn write_exr(file: &mut AtomicFile, baked: &Baked, truth: Option<&BrdfTable>) ->
 fn channels(sigma: &SigmaTable) -> Vec<[f32; 3]> {
     let cells = if sigma.planes().len() > 1 { N_CELLS } else { 0 };
     (0..cells).map(|cell| std::array::from_fn(|c| sigma.value(cell, c))).collect()
-}
-
-fn slice_picture(name: &str, truth: Option<&BrdfTable>, mean: &BrdfTable) -> Result<Picture> {
-    let truth = truth.map(|truth| truth as &dyn Brdf);
-    Ok(slice_figure(name, truth, mean, &SliceOptions::default())?)
-}
-
-fn sphere_picture(
-    name: &str,
-    truth: Option<&BrdfTable>,
-    mean: &BrdfTable,
-    environment: &Environment,
-    psnr: Option<f64>,
-) -> Result<Picture> {
-    let tables: Vec<&BrdfTable> = std::iter::once(mean).chain(truth).collect();
-    let images = render_env(&tables, environment, PICTURE_SIZE);
-    Ok(sphere_figure(name, images.get(1), &images[0], psnr)?)
 }

@@ -5,6 +5,7 @@ use clap::Args;
 use gpbrdf_core::brdf::materials;
 use serde_json::json;
 
+use super::json::to_json;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
@@ -24,7 +25,7 @@ impl Materials {
                     json!({ "name": name, "title": title, "description": m.description, "source": m.source })
                 })
                 .collect();
-            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(&all)?));
+            return terminal.print(&to_json(&all)?);
         }
         let width = materials().iter().map(|m| m.name.len()).max().unwrap_or(0);
         let lines = materials().iter().map(|m| format!("{:width$}  {}\n", m.name, m.description));

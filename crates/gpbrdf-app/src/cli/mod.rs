@@ -5,9 +5,12 @@ mod batch;
 mod check;
 mod convert;
 mod eval;
+mod figure_args;
 mod fit;
+mod gallery;
 mod info;
 mod input;
+mod json;
 mod learn;
 mod library;
 mod making;
@@ -20,6 +23,7 @@ mod render;
 mod reproduce;
 mod sample;
 mod shader;
+mod shell;
 mod slice;
 mod terminal;
 
@@ -38,13 +42,14 @@ struct Arguments {
     #[command(subcommand)]
     command: Command,
     /// Print only errors and the result itself.
-    #[arg(short, long, global = true)]
+    #[arg(help_heading = "General", short, long, global = true)]
     quiet: bool,
     /// Print more about the run; given twice, its results as they come.
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(help_heading = "General", short, long, global = true, action = clap::ArgAction::Count)]
     verbose: u8,
     /// Worker threads; all processors by default. Results do not depend on it.
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(help_heading = "General", long, global = true, value_name = "N")]
+    #[arg(value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 }
 
@@ -68,6 +73,8 @@ enum Command {
     Check(check::Check),
     /// A picture of a BRDF at one phi_d.
     Slice(slice::SliceCommand),
+    /// A figure of several materials, each predicted from few planned measurements.
+    Gallery(gallery::Gallery),
     /// Pictures of a sphere, a knot, a box or a mesh, on the GPU.
     Render(Box<render::Render>),
     /// Learn a prior from other materials, with which fewer measurements are enough.
@@ -82,6 +89,10 @@ enum Command {
     Info(info::Info),
     /// The built-in materials.
     Materials(materials::Materials),
+    /// A script for a shell that completes commands, options and their values.
+    Completions(shell::Completions),
+    /// Pages for man.
+    Man(shell::Man),
 }
 
 /// Runs the command line of this process.
@@ -111,6 +122,7 @@ pub fn main() -> ExitCode {
         Command::Eval(command) => command.run(&terminal),
         Command::Check(command) => command.run(&terminal),
         Command::Slice(command) => command.run(&terminal),
+        Command::Gallery(command) => command.run(&terminal),
         Command::Render(command) => command.run(&terminal),
         Command::Learn(command) => command.run(&terminal),
         Command::Convert(command) => command.run(&terminal),
@@ -118,6 +130,8 @@ pub fn main() -> ExitCode {
         Command::Shader(command) => command.run(&terminal),
         Command::Info(command) => command.run(&terminal),
         Command::Materials(command) => command.run(&terminal),
+        Command::Completions(command) => command.run(&terminal),
+        Command::Man(command) => command.run(&terminal),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -40,6 +40,14 @@ pub(crate) fn parse_exposure(text: &str) -> Result<Exposure, String> {
     }
 }
 
+/// A number from `low` to `high`.
+pub(crate) fn parse_number_in(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (low..=high).contains(&value) => Ok(value),
+        _ => Err(format!("expected a number from {low} to {high}")),
+    }
+}
+
 pub(crate) fn parse_positive(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

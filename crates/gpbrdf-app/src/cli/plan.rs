@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::base::number::significant;
+use gpbrdf_core::figure::FigureOptions;
 use gpbrdf_core::formats::read_environment;
 use gpbrdf_core::plan::{
     AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, MOST_MEASURED, Plan as Planned, plan, tour,
@@ -16,6 +17,7 @@ use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Content, FitOptions, HalfDiff, fit};
 
 use super::input::{environment, open};
+use super::json::to_json;
 use super::reading::Reading;
 use super::terminal::Terminal;
 use crate::job::{Observer, PriorName, expected_errors, plan_csv};
@@ -36,6 +38,12 @@ enum Order {
 }
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli plan --count 20 -o first.csv",
+    "\n  gpbrdf-cli plan --measured first-measured.csv --until 0.1",
+    "\n  gpbrdf-cli plan --simulate satin_purple.bsdf -o out",
+))]
 pub(crate) struct Plan {
     /// What was measured already: a file of scattered samples, or - for standard input. Without it the plan is that of
     /// the first measurements.
@@ -184,13 +192,13 @@ impl Plan {
         };
         let found = terminal.stage("Simulating", || Simulation::new(&source.name, &trial, &batches))?;
         if self.simulation.json {
-            terminal.print(&format!("{}\n", serde_json::to_string_pretty(&found.json())?))?;
+            terminal.print(&to_json(&found.json())?)?;
         } else {
             terminal.print(&found.table().markdown())?;
         }
         if let Some(folder) = &self.output {
             let folder = OutputFolder::create(folder)?;
-            AtomicFile::write(folder.join("plan.svg"), found.picture()?.as_bytes())?;
+            found.figure().save(folder.join("plan.svg"), &FigureOptions::default())?;
         }
         Ok(())
     }

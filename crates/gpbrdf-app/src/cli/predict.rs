@@ -14,6 +14,10 @@ use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli predict model.safetensors directions.csv -o values.csv",
+))]
 pub(crate) struct Predict {
     /// Model file.
     model: PathBuf,
@@ -23,7 +27,7 @@ pub(crate) struct Predict {
     #[command(flatten)]
     reading: Reading,
     /// CSV file to write instead of standard output.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(help_heading = "Output", short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Give intervals of the noise-free value instead of those of a new measurement.
     #[arg(long)]

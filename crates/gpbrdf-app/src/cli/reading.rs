@@ -8,13 +8,13 @@ use serde::Serialize;
 #[derive(Args, Clone, Copy, Debug, Default, Serialize)]
 pub(crate) struct Reading {
     /// What the values of measured samples are [default: what their file says, else brdf]
-    #[arg(long, value_enum, value_name = "KIND", help_heading = "Measured samples")]
+    #[arg(long, value_enum, value_name = "KIND", help_heading = "Input")]
     values: Option<Values>,
     /// The unit of their angles [default: what their file says, else degrees]
-    #[arg(long, value_enum, value_name = "UNIT", help_heading = "Measured samples")]
+    #[arg(long, value_enum, value_name = "UNIT", help_heading = "Input")]
     angles: Option<Angles>,
     /// The name of the angle from the normal [default: what their file says, else theta]
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Measured samples")]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Input")]
     zenith: Option<ZenithName>,
 }
 

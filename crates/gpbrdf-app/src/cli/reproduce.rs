@@ -10,44 +10,55 @@ use gpbrdf_core::brdf::materials as built_in_materials;
 use gpbrdf_core::formats::{read_neural_csv, sha256_file};
 use serde_json::{Value, json};
 
-use super::input::environment;
+use super::figure_args::FigureSize;
+use super::input::{environment, near_name};
 use super::library::read_materials;
 use super::reading::Reading;
 use super::terminal::Terminal;
-use crate::job::Observer;
+use crate::job::{FigureKind, Observer};
 use crate::output::OutputFolder;
 use crate::reproduce::{Context, Experiment, Materials, PAPER_MATERIALS, measurements, store};
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli reproduce --quick",
+    "\n  gpbrdf-cli reproduce --only table2,figures345 --figures pdf --width 85",
+))]
 pub(crate) struct Reproduce {
     /// Experiments to run. [default: all]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     only: Vec<Experiment>,
-    /// Smaller settings: a few minutes in all.
+    /// Smaller settings: about five minutes in all on two free processors.
     #[arg(long)]
     quick: bool,
     /// Folder of measurements: RGL .bsdf files, and MERL .binary files, which are recognised by their sha256.
-    #[arg(long, value_name = "DIR")]
+    #[arg(help_heading = "Input", long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Only these materials, by name.
-    #[arg(long, value_delimiter = ',', value_name = "NAME,...")]
+    #[arg(help_heading = "Input", long, value_delimiter = ',', value_name = "NAME,...")]
     materials: Vec<String>,
     /// CSV file with the weights of Neural BRDF fits to compare with, 675 per material.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Input", long, value_name = "FILE")]
     nbrdf: Option<PathBuf>,
     /// Materials to learn priors from, as for `gpbrdf-cli learn`, for the experiment prior. The measurements of --data
     /// are added to them.
-    #[arg(long, value_name = "FILE", num_args = 1..)]
+    #[arg(help_heading = "Input", long, value_name = "FILE", num_args = 1..)]
     library: Vec<PathBuf>,
     /// Environment map (.hdr or .exr, latitude-longitude) of the pictures instead of the built-in one.
-    #[arg(long, value_name = "FILE")]
+    #[arg(help_heading = "Input", long, value_name = "FILE")]
     env: Option<PathBuf>,
     /// Seconds that one dense fit may be expected to take; decides its number of samples.
     /// [default: 60, or 1 with --quick]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     budget: Option<f64>,
+    /// The kind of file of figures.
+    #[arg(help_heading = "Output", long, value_enum, value_name = "KIND", default_value_t)]
+    figures: FigureKind,
+    #[command(flatten)]
+    figure_size: FigureSize,
     /// Folder for the outputs. Experiments whose results of the same options it holds are not run again.
-    #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
+    #[arg(help_heading = "Output", short, long, value_name = "DIR", default_value = "gpbrdf-reproduction")]
     output: PathBuf,
 }
 
@@ -64,13 +75,16 @@ impl Reproduce {
             let known = measured.iter().any(|s| &s.name == name)
                 || built_in_materials().iter().any(|m| m.name == name);
             if !known {
+                let near = near_name(name).map_or_else(String::new, |near| format!("; did you mean {near}?"));
                 bail!(
-                    "--materials: expected names of materials of --data or built-in ones, found \"{name}\""
+                    "--materials: expected names of materials of --data or built-in ones, found \"{name}\"{near}"
                 );
             }
         }
         let library = self.library(&measured, terminal)?;
         let context = Context {
+            figures: self.figures,
+            figure_size: self.figure_size.into(),
             quick: self.quick,
             budget,
             environment: environment(self.env.as_deref())?,
@@ -145,6 +159,9 @@ impl Reproduce {
             "version": env!("CARGO_PKG_VERSION"),
             "quick": self.quick,
             "budget": context.budget,
+            "figures": self.figures.extension(),
+            "width": context.figure_size.width,
+            "dpi": context.figure_size.dots_per_inch,
             "materials": self.materials,
             "measurements": measured,
             "nbrdf": sum(&self.nbrdf)?,

@@ -32,6 +32,11 @@ enum Instrument {
 }
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli sample red-plastic --count 500 --noise 0.02 -o measured.csv",
+    "\n  gpbrdf-cli sample ward --layout in-plane | gpbrdf-cli bake -",
+))]
 pub(crate) struct Sample {
     /// A measurement, table or model file, or the name of a built-in material.
     input: PathBuf,

@@ -11,6 +11,10 @@ use gpbrdf_render::{ShaderLanguage, include, translate};
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli shader --lang glsl -o lookup.glsl",
+))]
 pub(crate) struct Shader {
     /// Shading language.
     #[arg(long, value_enum, default_value = "wgsl")]

@@ -7,18 +7,24 @@ use clap::{Args, value_parser};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::figure::{Slice, SliceOptions, slice_figure};
 use gpbrdf_core::formats::write_image_exr;
-use gpbrdf_core::{Brdf, BrdfTable};
+use gpbrdf_core::{Brdf, BrdfTable, Content};
 
+use super::figure_args::{FigureSize, PictureFile, title};
 use super::input::open;
 use super::reading::Reading;
 use super::terminal::Terminal;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli slice model.safetensors --difference satin_purple.bsdf -o slice.pdf",
+    "\n  gpbrdf-cli slice phong --phi-d 0 --exposure 2 --width 85 -o slice.svg",
+))]
 pub(crate) struct SliceCommand {
     /// A measurement, table or model file, or the name of a built-in material.
     input: PathBuf,
-    /// Picture to write: .png (as shown) or .exr (values in 1/sr).
-    #[arg(short, long, value_name = "FILE", default_value = "slice.png")]
+    /// Figure to write, .png, .svg or .pdf, or values in 1/sr, .exr.
+    #[arg(help_heading = "Output", short, long, value_name = "FILE", default_value = "slice.png")]
     output: PathBuf,
     /// phi_d in degrees; at 90 every direction is above the horizon.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, allow_hyphen_values = true)]
@@ -33,17 +39,15 @@ pub(crate) struct SliceCommand {
     #[arg(long, value_name = "TRUTH")]
     difference: Option<PathBuf>,
     /// Rows and columns of a slice.
-    #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = value_parser!(u32).range(8..=4096))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 512, value_parser = value_parser!(u32).range(8..=4096))]
     size: u32,
+    #[command(flatten)]
+    figure_size: FigureSize,
 }
 
 impl SliceCommand {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
-        let raw = match self.output.extension() {
-            Some(png) if png.eq_ignore_ascii_case("png") => false,
-            Some(exr) if exr.eq_ignore_ascii_case("exr") => true,
-            _ => bail!("\"{}\": expected a name that ends in .png or .exr", self.output.display()),
-        };
+        let file = PictureFile::of(&self.output)?;
         for (what, value) in [("--phi-d", self.phi_d), ("--exposure", self.exposure)] {
             if !value.is_finite() {
                 bail!("{what}: expected a finite number, found {value}");
@@ -58,19 +62,21 @@ impl SliceCommand {
         };
         let source = open(&self.input, Reading::default(), terminal)?;
         let prediction = source.table()?.into_owned();
-        let truth = self
-            .difference
-            .as_deref()
-            .map(|t| anyhow::Ok(open(t, Reading::default(), terminal)?.table()?.into_owned()))
-            .transpose()?;
-        if raw {
-            write_exr(&self.output, &prediction, truth.as_ref(), &options)?;
-        } else {
-            let truth = truth.as_ref().map(|t| t as &dyn Brdf);
-            let picture = slice_figure(&source.name, truth, &prediction, &options)?;
-            let mut file = AtomicFile::create(&self.output)?;
-            picture.write_png(&mut file)?;
-            file.commit()?;
+        let reference =
+            self.difference.as_deref().map(|path| open(path, Reading::default(), terminal)).transpose()?;
+        let truth = reference.as_ref().map(|source| anyhow::Ok(source.table()?.into_owned())).transpose()?;
+        match file {
+            PictureFile::Exr => write_exr(&self.output, &prediction, truth.as_ref(), &options)?,
+            PictureFile::Figure(_) => {
+                let shown = match &source.content {
+                    Content::Model(model) => title(&source.name, model),
+                    _ => source.name.clone(),
+                };
+                let against = reference.map_or_else(String::new, |truth| format!(", against {}", truth.name));
+                let truth = truth.as_ref().map(|t| t as &dyn Brdf);
+                let figure = slice_figure(&format!("{shown}{against}"), truth, &prediction, &options)?;
+                figure.save(&self.output, &self.figure_size.into())?;
+            }
         }
         terminal.summary(&format!("wrote {}", self.output.display()))
     }

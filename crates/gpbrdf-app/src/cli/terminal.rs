@@ -9,6 +9,7 @@ use gpbrdf_core::Progress;
 use gpbrdf_core::base::number::significant;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::json::to_json;
 use crate::job::{Found, Observer, Report, Stage, remaining};
 
 /// Standard output and standard error, as the user wants them, with a spinner for what takes long and a bar where it
@@ -84,11 +85,7 @@ impl Terminal {
         if !report.converged {
             self.warn("the search for hyper-parameters did not converge");
         }
-        if json {
-            self.print(&format!("{}\n", serde_json::to_string_pretty(report)?))
-        } else {
-            self.summary(&report.summary())
-        }
+        if json { self.print(&to_json(report)?) } else { self.summary(&report.summary()) }
     }
 
     /// Writes an error to standard error.

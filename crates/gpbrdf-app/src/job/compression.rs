@@ -10,6 +10,7 @@ use super::choices::parse_lattice;
 
 /// How much to store of a whole table, if it is to be compressed.
 #[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[command(next_help_heading = "Model")]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct Compression {
     /// Compress the whole table: fit inducing lattices of so many nodes along theta_h, theta_d and phi_d to

@@ -16,12 +16,14 @@
 mod backend;
 mod choices;
 mod compression;
+mod figure_kind;
 mod forecast;
 #[cfg(feature = "viewer")]
 mod hyper;
 mod judge;
 mod kernels;
 mod plan_file;
+mod portrait;
 mod prior;
 mod report;
 mod run;
@@ -31,12 +33,14 @@ mod stage;
 
 pub(crate) use backend::Backend;
 pub(crate) use choices::{LayoutChoice, NoiseChoice, SymmetryChoice, TransformChoice};
+pub(crate) use figure_kind::FigureKind;
 pub(crate) use forecast::{memory_bytes, remaining, samples_within};
 #[cfg(feature = "viewer")]
 pub(crate) use hyper::{bound_name, hyper_sliders};
 pub(crate) use judge::judge;
 pub(crate) use kernels::Kernels;
 pub(crate) use plan_file::{expected_errors, plan_csv};
+pub(crate) use portrait::{Portrait, Subject};
 pub(crate) use prior::PriorName;
 pub(crate) use report::{Report, metric_lines};
 #[cfg(feature = "viewer")]

@@ -172,7 +172,7 @@ impl Run {
         Self { observer: Arc::new(observer), seconds: Seconds::default(), start: Instant::now() }
     }
 
-    pub(super) fn observer(&self) -> Arc<dyn Observer> {
+    pub(crate) fn observer(&self) -> Arc<dyn Observer> {
         Arc::clone(&self.observer)
     }
 

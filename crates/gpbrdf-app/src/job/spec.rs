@@ -28,24 +28,26 @@ const MAX_NODES: usize = 1 << 22;
 
 /// How to measure and fit one material.
 #[derive(Args, Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[command(next_help_heading = "Model")]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct ModelSpec {
     /// Nodes of the lattice along theta_h, theta_d and phi_d, for example 48x32x24.
-    #[arg(long, value_name = "HxDxP", value_parser = parse_lattice, conflicts_with = "samples")]
+    #[arg(help_heading = "Sampling", long, value_name = "HxDxP", value_parser = parse_lattice)]
+    #[arg(conflicts_with = "samples")]
     pub(crate) lattice: Option<[usize; 3]>,
     /// Number of samples; the lattice is chosen near it. [default: 37616 on a lattice, 2000 off it]
-    #[arg(long, value_name = "N")]
+    #[arg(help_heading = "Sampling", long, value_name = "N")]
     pub(crate) samples: Option<usize>,
     /// Where to sample a source that can be evaluated at any direction.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(help_heading = "Sampling", long, value_enum, default_value_t)]
     pub(crate) layout: LayoutChoice,
     /// Symmetry in phi_d that samples and model rely on. auto measures it at a source that can be evaluated
     /// at any direction; scattered samples are taken for bilateral.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(help_heading = "Sampling", long, value_enum, default_value_t)]
     pub(crate) symmetry: SymmetryChoice,
     /// Place the lattice's nodes at sqrt(theta_h) = t^EXPONENT with t evenly spaced; above 1 they crowd at
     /// the specular peak. By default they stand on the table's cells there and spread out from it.
-    #[arg(long, value_name = "EXPONENT", allow_hyphen_values = true)]
+    #[arg(help_heading = "Sampling", long, value_name = "EXPONENT", allow_hyphen_values = true)]
     pub(crate) node_density: Option<f64>,
     /// Exact solver.
     #[arg(long, default_value = "auto", value_parser = named::<Solver>(&Solver::NAMES))]
@@ -86,7 +88,7 @@ pub(crate) struct ModelSpec {
     #[arg(long, default_value = "downweight", value_parser = named::<Outliers>(&["keep", "downweight"]))]
     pub(crate) outliers: Outliers,
     /// Seed of random layouts and restarts.
-    #[arg(long, value_name = "SEED", default_value_t)]
+    #[arg(help_heading = "Sampling", long, value_name = "SEED", default_value_t)]
     pub(crate) seed: u64,
     /// Further starts of the search for hyper-parameters.
     #[arg(long, value_name = "N", default_value_t)]

@@ -3,6 +3,7 @@
 
 use anyhow::Result;
 use gpbrdf_core::brdf::analytic::NEURAL_FLOATS;
+use gpbrdf_core::figure::{Axis, Curve};
 use gpbrdf_core::{
     Brdf, BrdfTable, CompressOptions, FitOptions, InducingSize, LatticeLayout, Metrics, Provenance, compress,
     detect_symmetry,
@@ -14,7 +15,6 @@ use super::context::{Context, Material, Outcome};
 use super::measures::{
     COVERAGE, LN_COS, MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, PSNR_POINT, RMS_LN, SSIM_ENV, cells, columns,
 };
-use super::plot::{Axis, Curve};
 use super::table::{Table, number};
 
 const COUNTS: [usize; 7] = [20, 40, 160, 400, 1000, 4000, 37_000];
@@ -61,8 +61,8 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             curve.rows.push(row);
         }
         let [psnr, share] = points;
-        quality.push(Curve { name: material.name().to_owned(), points: psnr });
-        coverage.push(Curve { name: material.name().to_owned(), points: share });
+        quality.push(Curve { name: material.name().to_owned(), points: psnr, ..Curve::default() });
+        coverage.push(Curve { name: material.name().to_owned(), points: share, ..Curve::default() });
     }
     rivals.add_means(2);
     curve.add_means(2);
@@ -77,11 +77,11 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
          interval of a measurement: 0.95 is calibrated, less is too sure of itself.",
     );
     let mut outcome = Outcome { tables: vec![rivals, curve], figures: Vec::new() };
-    let x = Axis { name: "measurements", logarithmic: true };
-    let y = Axis { name: "PSNR env, dB", logarithmic: false };
-    outcome.plot("beyond-samples.svg", "Quality against measurements", x, y, &quality)?;
-    let y = Axis { name: "share of cells in the 95 % interval", logarithmic: false };
-    outcome.plot("beyond-coverage.svg", "Calibration of the 95 % interval", x, y, &coverage)?;
+    let x = Axis::logarithmic("measurements");
+    let y = Axis::linear("PSNR env, dB");
+    outcome.plot(context, "beyond-samples", "Quality against measurements", x.clone(), y, quality)?;
+    let y = Axis::linear("share of cells in the 95 % interval");
+    outcome.plot(context, "beyond-coverage", "Calibration of the 95 % interval", x, y, coverage)?;
     Ok(outcome)
 }
 

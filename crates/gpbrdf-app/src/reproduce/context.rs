@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use gpbrdf_core::brdf::analytic::NeuralBrdf;
-use gpbrdf_core::figure::Picture;
+use gpbrdf_core::figure::{Axis, Curve, Figure, FigureOptions, Panel, Plot};
 use gpbrdf_core::formats::{merl_material_name, sha256_file};
 use gpbrdf_core::model::PriorChoice;
 use gpbrdf_core::{
@@ -14,10 +14,9 @@ use gpbrdf_core::{
     Source, Symmetry, bake_mean, bake_sigma, detect_symmetry, fit,
 };
 
-use super::plot::{Axis, Curve, curves};
 use super::prior::Materials;
 use super::table::Table;
-use crate::job::{Observer, judge, samples_within};
+use crate::job::{FigureKind, Observer, judge, samples_within};
 
 /// The results of an experiment: tables, and pictures with the names of their files.
 #[derive(Debug, Default)]
@@ -27,23 +26,26 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Adds curves as an SVG file.
+    /// Adds curves.
     pub(super) fn plot(
         &mut self,
-        file: &str,
+        context: &Context,
+        name: &str,
         title: &str,
-        x: Axis<'_>,
-        y: Axis<'_>,
-        of: &[Curve],
+        x: Axis,
+        y: Axis,
+        curves: Vec<Curve>,
     ) -> Result<()> {
-        self.figures.push((file.to_owned(), curves(title, x, y, of)?.into_bytes()));
-        Ok(())
+        self.figure(context, name, &curves_figure(title, x, y, curves))
     }
 
-    /// Adds a picture as a PNG file.
-    pub(super) fn picture(&mut self, file: String, picture: &Picture) -> Result<()> {
+    /// Adds a figure as a file of this name, without its extension.
+    pub(super) fn figure(&mut self, context: &Context, name: &str, figure: &Figure) -> Result<()> {
         let mut bytes = Vec::new();
-        picture.write_png(&mut bytes).with_context(|| format!("cannot draw \"{file}\""))?;
+        let file = format!("{name}.{}", context.figures.extension());
+        figure
+            .write(&mut bytes, context.figures.into(), &context.figure_size)
+            .with_context(|| format!("cannot draw \"{file}\""))?;
         self.figures.push((file, bytes));
         Ok(())
     }
@@ -63,8 +65,16 @@ pub(crate) const PAPER_MATERIALS: [&str; 7] = [
 /// The largest number of samples of a dense fit, whatever the budget: its matrix takes 3.2 GB.
 const MAX_DENSE: usize = 20_000;
 
+/// A figure of curves with a legend.
+pub(super) fn curves_figure(title: &str, x: Axis, y: Axis, curves: Vec<Curve>) -> Figure {
+    Figure::of_panels(title, vec![Panel::plot("", Plot { x, y, curves, legend: true }, 0.62)], "")
+}
+
 #[derive(Debug)]
 pub(crate) struct Context {
+    /// How figures are written.
+    pub(crate) figures: FigureKind,
+    pub(crate) figure_size: FigureOptions,
     pub(crate) quick: bool,
     /// Seconds for one dense fit.
     pub(crate) budget: f64,

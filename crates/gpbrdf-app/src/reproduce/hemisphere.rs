@@ -3,8 +3,9 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use anyhow::Result;
+use gpbrdf_core::base::number::short;
 use gpbrdf_core::brdf::{direction, material};
-use gpbrdf_core::figure::{Panel, Picture, panel_figure};
+use gpbrdf_core::figure::{Figure, Panel, Picture};
 use gpbrdf_core::gp::{DenseFit, OptimizeOptions};
 use gpbrdf_core::kernel::AxisMetric;
 use gpbrdf_core::{Brdf, Noise, Shape};
@@ -172,7 +173,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             paper.map_or(json!(null), |p| number(best.mae / p.0)),
             json!(if best.mae <= goal { "yes" } else { "no" }),
         ]);
-        outcome.picture(format!("figure1-{model}.png"), &figure(model, &best)?)?;
+        outcome.figure(context, &format!("figure1-{model}"), &figure(model, &best)?)?;
     }
     table.note(format!(
         "Light at {LIGHT_DEGREES} degrees; views down to {LIMIT_DEGREES} degrees, every degree of polar \
@@ -195,8 +196,8 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
 
 /// Discs of views that show the truth, the prediction with its samples in red, and the size of their
 /// difference.
-fn figure(model: &str, found: &Prediction) -> Result<Picture> {
-    const SIZE: usize = 220;
+fn figure(model: &str, found: &Prediction) -> Result<Figure> {
+    const SIZE: usize = 360;
     let limit = LIMIT_DEGREES.to_radians();
     let view = |column: usize, row: usize| {
         let centre = |i: usize| (2.0 * (i as f64 + 0.5) / SIZE as f64 - 1.0) * limit;
@@ -214,7 +215,7 @@ fn figure(model: &str, found: &Prediction) -> Result<Picture> {
     let disc = |values: Vec<f64>| {
         let mut values = values.into_iter();
         let colours: Vec<[u8; 3]> =
-            places.iter().map(|p| p.and_then(|_| values.next()).map_or([34, 34, 38], grey)).collect();
+            places.iter().map(|p| p.and_then(|_| values.next()).map_or([255; 3], grey)).collect();
         Picture::from_fn(SIZE, SIZE, |column, row| colours[row * SIZE + column])
     };
     let gaps: Vec<f64> = truth.iter().zip(&predicted).map(|(a, b)| 100.0 * (a - b).abs()).collect();
@@ -222,16 +223,21 @@ fn figure(model: &str, found: &Prediction) -> Result<Picture> {
     for &sample in &found.samples {
         let [x, y] = coordinates(sample).map(|x| 0.5 * (x / limit + 1.0) * SIZE as f64);
         #[expect(clippy::cast_possible_truncation, reason = "within the picture")]
-        shown.fill(x as i64, (SIZE as f64 - y) as i64, 2, 2, [230, 40, 40]);
+        shown.fill(x as i64 - 1, (SIZE as f64 - y) as i64 - 1, 3, 3, [230, 40, 40]);
     }
-    let panel = |picture, caption| Panel { picture, caption, scale: None };
-    let panels = [
-        panel(disc(truth), "truth"),
-        panel(shown, "prediction, samples"),
-        panel(disc(gaps), "100 x difference"),
+    let panels = vec![
+        Panel::picture("truth", disc(truth)),
+        Panel::picture("prediction and samples", shown),
+        Panel::picture("100 × |difference|", disc(gaps)),
     ];
-    let note = format!("{} samples, MAE {:.2e}", found.samples.len(), found.mae);
-    Ok(panel_figure(model, &panels, &note))
+    let title = format!("{model}, predicted from {} samples", found.samples.len());
+    let note = format!(
+        "Views of a surface that is lit from {LIGHT_DEGREES}° on the left, the normal in the middle and \
+         {LIMIT_DEGREES}° at the rim. White is the largest value of the truth, {} 1/sr. Mean absolute error {} 1/sr.",
+        short(top, 3),
+        short(found.mae, 3)
+    );
+    Ok(Figure::of_panels(title, panels, note))
 }
 
 #[cfg(test)]

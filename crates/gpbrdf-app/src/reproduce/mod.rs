@@ -9,7 +9,6 @@ mod materials;
 mod measures;
 mod paper_lattice;
 mod pictures;
-mod plot;
 mod principal;
 mod prior;
 mod sampling;
@@ -23,7 +22,7 @@ use clap::ValueEnum;
 use context::Outcome;
 pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
 pub(crate) use prior::Materials;
-pub(crate) use simulate::{BATCHES, Simulation, Trial};
+pub(crate) use simulate::{BATCHES, Simulation, Trained, Trial};
 
 /// Seconds for a fit on a lattice, its table, pictures and metrics.
 const LATTICE: f64 = 4.0;

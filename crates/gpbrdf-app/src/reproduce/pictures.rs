@@ -2,12 +2,11 @@
 
 use anyhow::Result;
 use gpbrdf_core::FitOptions;
-use gpbrdf_core::figure::{SliceOptions, slice_figure, sphere_figure};
+use gpbrdf_core::figure::{Axis, Curve, SliceOptions, slice_figure, sphere_figure};
 use gpbrdf_core::judge::{Image, PixelDifference, render_env, render_point};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
-use super::plot::{Axis, Curve};
 use super::table::{Table, number};
 use crate::job::PAPER_SAMPLES;
 
@@ -30,23 +29,28 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         "Figure 5 (e): pixel difference |1 - b / a| of the sphere",
         &["material", "truth", "light", "mean", "median", "99th percentile", "largest", "share below 5 %"],
     );
-    let size = if context.quick { 96 } else { 256 };
+    let size = if context.quick { 96 } else { 512 };
     let mut distributions = Vec::new();
     for material in context.paper_materials()? {
         let (name, truth) = (material.name(), material.truth()?);
         let samples = material.lattice_samples(PAPER_SAMPLES)?;
         let fitted = context.fit_and_compare(&truth, &samples, &FitOptions::default(), false)?;
         let tables = [&*truth, &fitted.mean];
-        let slice = slice_figure(name, Some(&*truth), &fitted.mean, &SliceOptions::default())?;
-        outcome.picture(format!("figure4-slice-{name}.png"), &slice)?;
+        let title = format!("{name}, predicted from {} samples", samples.angles.len());
+        let slice = slice_figure(&title, Some(&*truth), &fitted.mean, &SliceOptions::default())?;
+        outcome.figure(context, &format!("figure4-slice-{name}"), &slice)?;
         let lights = [
             ("environment", render_env(&tables, &context.environment, size)),
             ("point", render_point(&tables, size)),
         ];
         for (light, images) in lights {
             let [a, b] = &images[..] else { continue };
-            let picture = sphere_figure(&format!("{name}, {light}"), Some(a), b, None)?;
-            outcome.picture(format!("figure5-{light}-{name}.png"), &picture)?;
+            let lit = match light {
+                "point" => "under a point light",
+                _ => "under an environment",
+            };
+            let picture = sphere_figure(&format!("{title}, {lit}"), Some(a), b, None)?;
+            outcome.figure(context, &format!("figure5-{light}-{name}"), &picture)?;
             let found = PixelDifference::new(a, b)?;
             table.rows.push(vec![
                 json!(name),
@@ -65,7 +69,11 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
                     let share = i as f64 / STEPS as f64;
                     values.get(i * last / STEPS).map(|&x| (x.max(1e-7), share))
                 });
-                distributions.push(Curve { name: name.to_owned(), points: points.collect() });
+                distributions.push(Curve {
+                    name: name.to_owned(),
+                    points: points.collect(),
+                    ..Curve::default()
+                });
             }
         }
     }
@@ -73,14 +81,15 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         "The paper finds the difference below 5 % under its point light, on pictures of its own scene. \
          Figures 3 and 5 are spheres here; figure 4 shows slices at phi_d = 90 degrees.",
     );
-    let x = Axis { name: "|1 - b / a|, point light", logarithmic: true };
-    let y = Axis { name: "share of pixels below", logarithmic: false };
+    let x = Axis::logarithmic("|1 − b / a|, point light");
+    let y = Axis::linear("share of pixels below");
     outcome.plot(
-        "figure5-difference.svg",
+        context,
+        "figure5-difference",
         "Figure 5 (e): distribution of the pixel difference",
         x,
         y,
-        &distributions,
+        distributions,
     )?;
     outcome.tables.push(table);
     Ok(outcome)

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use gpbrdf_core::brdf::Brdf;
+use gpbrdf_core::figure::{Axis, Curve};
 use gpbrdf_core::plan::{Belief, Cells, Device, Goal, MOST_CANDIDATES, plan};
 use gpbrdf_core::prior::{LearnOptions, Library, family, learn};
 use gpbrdf_core::{BrdfTable, Metrics};
@@ -12,7 +13,6 @@ use serde_json::{Value, json};
 
 use super::context::{Context, Material, Outcome};
 use super::measures::{COVERAGE, MEDIAN_LN, Measure, PSNR_ENV, cells, columns};
-use super::plot::{Axis, Curve};
 use super::principal::Principal;
 use super::simulate::{BATCHES, Trained, Trial};
 use super::table::{Table, number};
@@ -64,7 +64,7 @@ struct Row {
 }
 
 impl From<Trained> for Row {
-    fn from(Trained { choice, samples, metrics, expected }: Trained) -> Self {
+    fn from(Trained { choice, samples, metrics, expected, .. }: Trained) -> Self {
         Self { choice, samples, metrics, expected }
     }
 }
@@ -129,11 +129,12 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
             groups.entry((place, row.choice, row.samples)).or_default().push(row);
         }
     }
-    summarised(all, &groups, materials.len())
+    summarised(context, all, &groups, materials.len())
 }
 
 /// One table of means and worst cases, one of all materials, and the curves.
 fn summarised(
+    context: &Context,
     all: Table,
     groups: &BTreeMap<(usize, &'static str, usize), Vec<Row>>,
     count: usize,
@@ -166,7 +167,9 @@ fn summarised(
         let point = (*samples as f64, psnr);
         match curves.iter_mut().find(|curve| curve.name == *choice) {
             Some(curve) => curve.points.push(point),
-            None => curves.push(Curve { name: (*choice).to_owned(), points: vec![point] }),
+            None => {
+                curves.push(Curve { name: (*choice).to_owned(), points: vec![point], ..Curve::default() })
+            }
         }
     }
     summary.note(
@@ -178,9 +181,9 @@ fn summarised(
          dB.",
     );
     let mut outcome = Outcome { tables: vec![summary, all], figures: Vec::new() };
-    let x = Axis { name: "directions", logarithmic: true };
-    let y = Axis { name: "mean PSNR env, dB", logarithmic: false };
-    outcome.plot("prior.svg", "Few measurements with a learned prior", x, y, &curves)?;
+    let x = Axis::logarithmic("directions");
+    let y = Axis::linear("mean PSNR env, dB");
+    outcome.plot(context, "prior", "Few measurements with a learned prior", x, y, curves)?;
     Ok(outcome)
 }
 

@@ -2,12 +2,12 @@
 
 use anyhow::Result;
 use gpbrdf_core::brdf::N_CELLS;
+use gpbrdf_core::figure::{Axis, Curve};
 use gpbrdf_core::{FitOptions, LatticeLayout, Layout, SampleSet, Solver};
 use serde_json::json;
 
 use super::context::{Context, Outcome};
 use super::measures::{MAE, MEDIAN_LN, MSE, Measure, PSNR_ENV, cells, columns};
-use super::plot::{Axis, Curve};
 use super::table::{Table, number};
 
 /// Percent of the cells of a table.
@@ -36,7 +36,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         &columns(&["solver", "rate %", "samples"], &MEASURES, &["fit s"]),
     );
     let names = ["lattice", "dense, random cells"];
-    let mut errors = names.map(|name| Curve { name: name.into(), points: Vec::new() });
+    let mut errors = names.map(|name| Curve { name: name.into(), points: Vec::new(), ..Curve::default() });
     let mut times = errors.clone();
     let most = context.dense_samples(1);
     let rates = if context.quick { &QUICK_RATES[..] } else { &RATES[..] };
@@ -75,11 +75,11 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
         context.budget
     ));
     let mut outcome = Outcome::default();
-    let x = Axis { name: "sampling rate, %", logarithmic: true };
-    let y = Axis { name: "MAE, 1/sr", logarithmic: true };
-    outcome.plot("figure2-error.svg", "Figure 2: error", x, y, &errors)?;
-    let y = Axis { name: "fit, s", logarithmic: true };
-    outcome.plot("figure2-time.svg", "Figure 2: time of the fit", x, y, &times)?;
+    let x = Axis::logarithmic("sampling rate, %");
+    let y = Axis::logarithmic("MAE, 1/sr");
+    outcome.plot(context, "figure2-error", "Figure 2: error", x.clone(), y, errors.to_vec())?;
+    let y = Axis::logarithmic("fit, s");
+    outcome.plot(context, "figure2-time", "Figure 2: time of the fit", x, y, times.to_vec())?;
     outcome.tables.push(table);
     Ok(outcome)
 }

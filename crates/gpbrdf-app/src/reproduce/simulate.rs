@@ -3,18 +3,19 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use gpbrdf_core::figure::{Axis, Curve, Figure};
 use gpbrdf_core::model::PriorChoice;
 use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, expected_error, plan};
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::sample::InPlaneScan;
 use gpbrdf_core::{
-    Brdf, BrdfTable, Environment, FitOptions, HalfDiff, LatticeLayout, Layout, Metrics, Sample, SampleSet,
-    Symmetry, bake_mean, bake_sigma, fit,
+    Brdf, BrdfTable, Environment, FitOptions, HalfDiff, LatticeLayout, Layout, Metrics, Model, Sample,
+    SampleSet, Symmetry, bake_mean, bake_sigma, fit,
 };
 use serde_json::{Value, json};
 
+use super::context::curves_figure;
 use super::measures::{COVERAGE, MEDIAN_LN, Measure, PSNR_ENV, cells, columns};
-use super::plot::{Axis, Curve, curves};
 use super::table::{Table, number};
 use crate::job::judge;
 
@@ -43,6 +44,7 @@ pub(crate) struct Trained {
     /// How the directions were chosen.
     pub(crate) choice: &'static str,
     pub(crate) samples: usize,
+    pub(crate) model: Arc<Model>,
     pub(crate) metrics: Metrics,
     /// The root mean square error of `ln f` that the process of the samples expects; `None` for a process on a lattice.
     pub(crate) expected: Option<f64>,
@@ -134,7 +136,8 @@ impl Trial<'_> {
         let (mean, sigma) = (bake_mean(&model), bake_sigma(&model)?);
         let metrics = judge(self.truth, &model, &mean, Some(&sigma), self.environment)?;
         let expected = expected.transpose()?;
-        Ok((Trained { choice, samples: samples.len(), metrics, expected }, belief))
+        let model = Arc::new(model);
+        Ok((Trained { choice, samples: samples.len(), model, metrics, expected }, belief))
     }
 }
 
@@ -194,21 +197,21 @@ impl Simulation {
         json!({ "material": self.material, "rows": rows.collect::<Vec<_>>() })
     }
 
-    /// The quality of the pictures against the number of samples, as an SVG file.
-    ///
-    /// # Errors
-    /// If the drawing backend fails.
-    pub(crate) fn picture(&self) -> Result<String> {
+    /// The quality of the pictures against the number of samples.
+    pub(crate) fn figure(&self) -> Figure {
         let mut all: Vec<Curve> = Vec::new();
         for row in &self.rows {
             let point = (row.samples as f64, row.metrics.images.psnr_env);
             match all.iter_mut().find(|curve| curve.name == row.choice) {
                 Some(curve) => curve.points.push(point),
-                None => all.push(Curve { name: row.choice.to_owned(), points: vec![point] }),
+                None => {
+                    all.push(Curve { name: row.choice.to_owned(), points: vec![point], ..Curve::default() })
+                }
             }
         }
-        let x = Axis { name: "directions", logarithmic: true };
-        let y = Axis { name: "PSNR env, dB", logarithmic: false };
-        curves(&self.material, x, y, &all)
+        let x = Axis::logarithmic("directions");
+        let y = Axis::linear("PSNR env, dB");
+        let title = format!("{}: quality of the prediction by how directions are chosen", self.material);
+        curves_figure(&title, x, y, all)
     }
 }

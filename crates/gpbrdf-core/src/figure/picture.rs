@@ -1,10 +1,7 @@
-//! An 8-bit picture with drawing and text, and its PNG file.
+//! An 8-bit picture, and its PNG file.
 
 use std::io::Write;
 use std::path::Path;
-
-use font8x8::legacy::{BASIC_LEGACY, GREEK_LEGACY, LATIN_LEGACY};
-use image::ImageEncoder as _;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
@@ -13,9 +10,6 @@ use crate::brdf::Rgb;
 
 /// An sRGB colour, 8 bits per channel.
 pub type Rgb8 = [u8; 3];
-
-/// A lower-case theta of full height. The font's own theta is as low as an `e`, and looks like one.
-const THETA: [u8; 8] = [0x1c, 0x36, 0x36, 0x3e, 0x36, 0x36, 0x1c, 0x00];
 
 /// An 8-bit sRGB picture, rows from top to bottom. Drawing outside of it has no effect.
 pub type Picture = Raster<Rgb8>;
@@ -30,56 +24,18 @@ impl Picture {
         }
     }
 
-    /// Copies `other` with its upper left corner at `(x, y)`.
-    pub fn blit(&mut self, x: i64, y: i64, other: &Self) {
-        for (i, &colour) in other.pixels().iter().enumerate() {
-            self.set(x + (i % other.width()) as i64, y + (i / other.width()) as i64, colour);
-        }
-    }
-
-    /// Writes `text` with its upper left corner at `(x, y)`, each dot of the 8 x 8 font `scale` pixels wide.
-    ///
-    /// An underscore after a Greek letter makes the next character a subscript, three dots lower. A character
-    /// that is not in the font is shown as `?`.
-    pub fn text(&mut self, x: i64, y: i64, scale: usize, colour: Rgb8, text: &str) {
-        for letter in letters(text, scale) {
-            for (row, bits) in glyph(letter.character).into_iter().enumerate() {
-                for column in 0..8 {
-                    if bits >> column & 1 == 1 {
-                        let left = x + (letter.x + column * scale) as i64;
-                        let top = y + (letter.y + row * scale) as i64;
-                        self.fill(left, top, scale, scale, colour);
-                    }
-                }
-            }
-        }
-    }
-
-    /// The width in pixels of a text that is written by [`Picture::text`], without the empty column after the
-    /// last character.
-    #[must_use]
-    pub fn text_width(text: &str, scale: usize) -> usize {
-        letters(text, scale).last().map_or(0, |letter| letter.x + 7 * scale)
-    }
-
     /// Writes the picture as PNG.
     ///
     /// # Errors
     /// Any error of `out`; also an error for an empty picture, which PNG cannot hold.
     pub fn write_png(&self, out: &mut impl Write) -> std::io::Result<()> {
-        let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
-        image::codecs::png::PngEncoder::new(&mut *out)
-            .write_image(
-                self.pixels().as_flattened(),
-                side(self.width())?,
-                side(self.height())?,
-                image::ExtendedColorType::Rgb8,
-            )
-            .map_err(|error| match error {
-                image::ImageError::IoError(error) => error,
-                other => std::io::Error::other(other),
-            })?;
-        out.flush()
+        write_png(out, self.width(), self.height(), png::ColorType::Rgb, self.pixels().as_flattened(), None)
+    }
+
+    /// [`Picture::write_png`] with a resolution, by which other programs know the size on paper.
+    pub(crate) fn write_png_at(&self, out: &mut impl Write, dots_per_inch: f64) -> std::io::Result<()> {
+        let pixels = self.pixels().as_flattened();
+        write_png(out, self.width(), self.height(), png::ColorType::Rgb, pixels, Some(dots_per_inch))
     }
 
     /// Writes the picture as a PNG file.
@@ -117,10 +73,66 @@ pub fn write_rgba_png(
         let what = format!("expected {width} x {height} pixels, at least one, found {}", pixels.len());
         return Err(std::io::Error::other(what));
     }
+    write_png(out, width, height, png::ColorType::Rgba, pixels.as_flattened(), None)
+}
+
+/// Writes pictures of one size as an animated PNG that repeats without end, each shown for `milliseconds`.
+///
+/// # Errors
+/// Any error of `out`, or [`std::io::ErrorKind::Other`] for no picture, an empty one, or one of another size.
+pub fn write_moving_png(out: &mut impl Write, frames: &[Picture], milliseconds: u16) -> std::io::Result<()> {
     let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
-    image::codecs::png::PngEncoder::new(&mut *out)
-        .write_image(pixels.as_flattened(), side(width)?, side(height)?, image::ExtendedColorType::Rgba8)
-        .map_err(std::io::Error::other)?;
+    let size = frames.first().map_or((0, 0), |frame| (frame.width(), frame.height()));
+    if let Some(odd) = frames.iter().find(|frame| (frame.width(), frame.height()) != size) {
+        let found = format!("{} x {}", odd.width(), odd.height());
+        let what = format!("expected frames of {} x {} pixels, found one of {found}", size.0, size.1);
+        return Err(std::io::Error::other(what));
+    }
+    let mut encoder = png::Encoder::new(&mut *out, side(size.0)?, side(size.1)?);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_animated(side(frames.len())?, 0).map_err(failed)?;
+    encoder.set_frame_delay(milliseconds, 1000).map_err(failed)?;
+    let mut writer = encoder.write_header().map_err(failed)?;
+    for frame in frames {
+        writer.write_image_data(frame.pixels().as_flattened()).map_err(failed)?;
+    }
+    writer.finish().map_err(failed)?;
+    out.flush()
+}
+
+fn failed(error: png::EncodingError) -> std::io::Error {
+    match error {
+        png::EncodingError::IoError(error) => error,
+        other => std::io::Error::other(other),
+    }
+}
+
+fn write_png(
+    out: &mut impl Write,
+    width: usize,
+    height: usize,
+    colour: png::ColorType,
+    bytes: &[u8],
+    dots_per_inch: Option<f64>,
+) -> std::io::Result<()> {
+    let side = |n: usize| u32::try_from(n).map_err(std::io::Error::other);
+    let mut encoder = png::Encoder::new(&mut *out, side(width)?, side(height)?);
+    encoder.set_color(colour);
+    encoder.set_depth(png::BitDepth::Eight);
+    if let Some(dots) = dots_per_inch {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a cast to an integer saturates"
+        )]
+        let per_metre = (dots / 0.0254).round() as u32;
+        let unit = png::Unit::Meter;
+        encoder.set_pixel_dims(Some(png::PixelDimensions { xppu: per_metre, yppu: per_metre, unit }));
+    }
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(bytes).map_err(failed)?;
+    writer.finish().map_err(failed)?;
     out.flush()
 }
 
@@ -130,46 +142,6 @@ pub fn write_rgba_png(
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the value is within [0, 255.5]")]
 pub(crate) fn tone_map(linear: Rgb, scale: f64, gamma: f64) -> Rgb8 {
     linear.map(|x| ((x * scale).clamp(0.0, 1.0).powf(1.0 / gamma) * 255.0 + 0.5) as u8)
-}
-
-/// One character and its place.
-struct Letter {
-    character: char,
-    x: usize,
-    y: usize,
-}
-
-/// Places the characters of a line of text.
-fn letters(text: &str, scale: usize) -> Vec<Letter> {
-    let mut letters = Vec::new();
-    let mut x = 0;
-    let mut characters = text.chars().peekable();
-    let mut after_greek = false;
-    while let Some(character) = characters.next() {
-        let subscript = if after_greek && character == '_' { characters.next() } else { None };
-        if let Some(character) = subscript {
-            letters.push(Letter { character, x, y: 3 * scale });
-            x += 8 * scale;
-        } else {
-            letters.push(Letter { character, x, y: 0 });
-            x += 8 * scale;
-        }
-        after_greek = ('\u{390}'..='\u{3c9}').contains(&character);
-    }
-    letters
-}
-
-/// The rows of a character; the lowest bit is at the left.
-fn glyph(character: char) -> [u8; 8] {
-    let at = character as usize;
-    let found = match character {
-        '\u{3b8}' => Some(&THETA),
-        '\0'..='\u{7f}' => BASIC_LEGACY.get(at),
-        '\u{a0}'..='\u{ff}' => LATIN_LEGACY.get(at - 0xa0),
-        '\u{390}'..='\u{3c9}' => GREEK_LEGACY.get(at - 0x390),
-        _ => None,
-    };
-    *found.unwrap_or(&BASIC_LEGACY['?' as usize])
 }
 
 #[cfg(test)]
@@ -191,21 +163,21 @@ mod tests {
     }
 
     #[test]
-    fn text_stays_within_its_width_and_the_picture() {
-        for text in ["Wy_", "\u{3b8}_h", "0.5\u{b0}", "\u{4e2d}"] {
-            let width = Picture::text_width(text, 2);
-            let mut picture = Picture::filled(width + 20, 40, [0; 3]);
-            picture.text(10, 10, 2, [255; 3], text);
-            let lit = |i: usize| picture.pixels()[i] != [0; 3];
-            let columns: Vec<_> =
-                (0..picture.pixels().len()).filter(|&i| lit(i)).map(|i| i % picture.width()).collect();
-            let (first, last) = (*columns.iter().min().unwrap(), *columns.iter().max().unwrap());
-            assert!(first >= 10 && last < 10 + width + 2, "{text} {first} {last} {width}");
-            picture.text(-7, -9, 3, [9; 3], text);
+    fn a_moving_picture_holds_its_frames_in_order() {
+        let frames: Vec<Picture> = [[9u8; 3], [80; 3], [200; 3]].map(|c| Picture::filled(6, 4, c)).to_vec();
+        let mut bytes = Vec::new();
+        write_moving_png(&mut bytes, &frames, 250).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        assert_eq!(reader.info().animation_control().unwrap().num_frames, 3);
+        let mut buffer = vec![0; reader.output_buffer_size().unwrap()];
+        for frame in &frames {
+            reader.next_frame(&mut buffer).unwrap();
+            assert_eq!(buffer, frame.pixels().as_flattened());
         }
-        assert_eq!(Picture::text_width("ab", 2), 30);
-        assert_eq!(Picture::text_width("\u{3b8}_h", 2), 16 + 14);
-        assert_eq!(Picture::text_width("", 2), 0);
+        assert!(write_moving_png(&mut bytes, &[], 250).is_err());
+        let odd = [Picture::filled(6, 4, [0; 3]), Picture::filled(4, 6, [0; 3])];
+        let error = write_moving_png(&mut bytes, &odd, 250).unwrap_err().to_string();
+        assert_eq!(error, "expected frames of 6 x 4 pixels, found one of 4 x 6");
     }
 
     #[test]

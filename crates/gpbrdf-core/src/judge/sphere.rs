@@ -177,6 +177,18 @@ impl ShadingFrame {
         Some((Vector3::new(light.dot(&self.e), light.dot(&self.f), cosine), self.wo))
     }
 
+    /// The unit direction to the viewer in the local frame.
+    #[must_use]
+    pub fn to_viewer(&self) -> Vector3<f64> {
+        self.wo
+    }
+
+    /// The direction of space for one of the local frame.
+    #[must_use]
+    pub fn to_world(&self, local: &Vector3<f64>) -> Vector3<f64> {
+        local.x * self.e + local.y * self.f + local.z * self.normal
+    }
+
     /// Adds the radiance `f(wi, wo) cos theta_i irradiance` that the point reflects towards the viewer to
     /// `sums`, one for each table. The light comes from the unit direction `light`; `irradiance` is that of a
     /// surface that faces it. `f` is looked up trilinearly. Nothing is added if the cosine is not positive or

@@ -32,16 +32,22 @@ use crate::output::OutputFolder;
 const NAMED: usize = 5;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli batch \"scans/**/*.bsdf\" -o tables --write model,report",
+    "\n  gpbrdf-cli batch scans/*.csv --part 2/4",
+))]
 pub(crate) struct Batch {
     /// Measurements, tables and model files, patterns of their names such as "scans/*.csv" or "scans/**/*.bsdf", and
     /// built-in materials.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Folder for the outputs; made if need be. Each material gets a folder in it, and batch.jsonl a line.
-    #[arg(short, long, value_name = "DIR", default_value = "gpbrdf-out")]
+    #[arg(help_heading = "Output", short, long, value_name = "DIR", default_value = "gpbrdf-out")]
     output: PathBuf,
     /// The files to write of each material.
     #[arg(
+        help_heading = "Output",
         long,
         value_enum,
         value_name = "FILE,FILE,...",
@@ -132,7 +138,7 @@ impl Batch {
             "env_sha256": self.making.env.as_ref().map(sha256_file).transpose()?,
             "metrics": !self.making.no_metrics,
             "sigma": !self.making.no_sigma,
-            "write": self.write.iter().map(|product| product.file_name()).collect::<Vec<_>>(),
+            "write": self.write.iter().map(|product| product.file_name(self.making.figures)).collect::<Vec<_>>(),
         }))
     }
 }

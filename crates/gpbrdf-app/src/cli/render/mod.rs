@@ -17,7 +17,9 @@ use gpbrdf_render::{
 };
 use serde_json::{Value, json};
 
+use super::figure_args::{FigureSize, PictureFile, title};
 use super::input::{environment, open};
+use super::json::to_json;
 use super::parse::{Exposure, parse_exposure, parse_pair, parse_positive, parse_size, parse_vector};
 use super::reading::Reading;
 use super::terminal::Terminal;
@@ -29,6 +31,11 @@ use pictures::Pictures;
 const CHUNK: u32 = 16;
 
 #[derive(Args, Debug)]
+#[command(after_help = concat!(
+    "Examples:",
+    "\n  gpbrdf-cli render purple-paint --scene knot --compare -o knot.png",
+    "\n  gpbrdf-cli render model.safetensors --scene bunny.obj --env studio.hdr --spp 256",
+))]
 pub(crate) struct Render {
     /// A measurement, table or model file, the name of a built-in material, or - for measured samples from
     /// standard input.
@@ -36,18 +43,21 @@ pub(crate) struct Render {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// Picture to write: .png (as shown) or .exr (linear). May be repeated.
-    #[arg(short, long, value_name = "FILE", default_value = "render.png")]
+    #[command(flatten)]
+    model: ModelSpec,
+    /// Picture to write: .png as shown, .svg or .pdf with a title, or linear .exr. May be repeated.
+    #[arg(help_heading = "Output", short, long, value_name = "FILE", default_value = "render.png")]
     output: Vec<PathBuf>,
     /// The object: sphere, knot, box, or a mesh: Wavefront .obj, glTF .glb or .gltf.
-    #[arg(long, value_name = "sphere|knot|box|FILE", default_value = "sphere")]
+    #[arg(help_heading = "Scene", long, value_name = "sphere|knot|box|FILE", default_value = "sphere")]
     scene: PathBuf,
     /// A single light instead of an environment.
-    #[arg(long, value_enum, conflicts_with = "env")]
+    #[arg(help_heading = "Scene", long, value_enum, conflicts_with = "env")]
     light: Option<LightName>,
     /// Direction towards the directional light, or position of the point light; the object fills the unit
     /// sphere.
     #[arg(
+        help_heading = "Scene",
         long,
         value_name = "X,Y,Z",
         default_value = "1,1,1.5",
@@ -56,25 +66,28 @@ pub(crate) struct Render {
     )]
     light_at: [f32; 3],
     /// Environment map: studio, or a latitude-longitude .hdr or .exr file. [default: studio]
-    #[arg(long, value_name = "studio|FILE")]
+    #[arg(help_heading = "Scene", long, value_name = "studio|FILE")]
     env: Option<PathBuf>,
     /// How directions of the environment's light are drawn: by the light, by the material, or by both.
-    #[arg(long, value_enum, default_value = "mis")]
+    #[arg(help_heading = "Scene", long, value_enum, default_value = "mis")]
     sampling: SamplingName,
     /// Samples per pixel.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=1 << 20))]
+    #[arg(help_heading = "Scene", long, value_name = "N", default_value_t = 64)]
+    #[arg(value_parser = value_parser!(u32).range(1..=1 << 20))]
     spp: u32,
     /// Columns and rows of the picture.
-    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
+    #[arg(help_heading = "Scene", long, value_name = "WxH", default_value = "512x512", value_parser = parse_size)]
     size: [u32; 2],
     /// Turn of the camera to the right and up, degrees.
-    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = parse_pair, allow_hyphen_values = true)]
+    #[arg(help_heading = "Scene", long, value_name = "AZIMUTH,ELEVATION")]
+    #[arg(value_parser = parse_pair, allow_hyphen_values = true)]
     orbit: Option<[f32; 2]>,
     /// Parallel rays; a unit sphere touches the frame, as in the image metrics.
-    #[arg(long)]
+    #[arg(help_heading = "Scene", long)]
     orthographic: bool,
     /// Exposure in stops; auto brings the 90th percentile to 0.6.
     #[arg(
+        help_heading = "Output",
         long,
         value_name = "auto|STOPS",
         default_value = "auto",
@@ -83,33 +96,34 @@ pub(crate) struct Render {
     )]
     exposure: Exposure,
     /// Tone curve.
-    #[arg(long, value_enum, default_value = "filmic")]
+    #[arg(help_heading = "Output", long, value_enum, default_value = "filmic")]
     tone: ToneName,
     /// What the picture shows; the difference is prediction - truth in exposed linear light, red where too
     /// bright.
-    #[arg(long, value_enum, default_value = "prediction")]
+    #[arg(help_heading = "Output", long, value_enum, default_value = "prediction")]
     show: ShowName,
     /// What is behind the object.
-    #[arg(long, value_enum, default_value = "environment")]
+    #[arg(help_heading = "Output", long, value_enum, default_value = "environment")]
     background: BackgroundName,
     /// End of the scale of false colours. [default: chosen by the values]
-    #[arg(long, value_name = "VALUE", value_parser = parse_positive)]
+    #[arg(help_heading = "Output", long, value_name = "VALUE", value_parser = parse_positive)]
     limit: Option<f32>,
     /// One picture of truth, prediction and difference, with PSNR and SSIM.
-    #[arg(long, conflicts_with_all = ["show", "background"])]
+    #[arg(help_heading = "Output", long, conflicts_with_all = ["show", "background"])]
     compare: bool,
-    #[command(flatten)]
-    model: ModelSpec,
     /// Where to bake.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(help_heading = "Output", long, value_enum, default_value_t)]
     backend: Backend,
+    #[command(flatten)]
+    figure_size: FigureSize,
     /// Print JSON on standard output, and nothing else there.
-    #[arg(long)]
+    #[arg(help_heading = "Output", long)]
     json: bool,
 }
 
 /// What is rendered with: the tables of the truth and of the prediction, as far as they are shown.
 struct Materials {
+    title: String,
     truth: Option<BrdfTable>,
     prediction: Option<Baked>,
 }
@@ -125,8 +139,8 @@ struct Rendered {
 impl Render {
     pub(crate) fn run(&self, terminal: &Terminal) -> Result<()> {
         for path in &self.output {
-            if is_exr(path)? && self.compare {
-                bail!("\"{}\": expected a .png file, as --compare makes a figure", path.display());
+            if PictureFile::of(path)? == PictureFile::Exr && self.compare {
+                bail!("\"{}\": expected .png, .svg or .pdf, as --compare makes a figure", path.display());
             }
         }
         let mut run = Run::new(terminal.clone());
@@ -182,12 +196,12 @@ impl Render {
             "adapter": context.describe(),
             "exposure": exposure,
         });
-        let mut title = source.name.clone();
+        let mut title = materials.title.clone();
         if materials.truth.is_some() && materials.prediction.is_some() {
             let psnr = psnr(&truth, &prediction, exposure)?;
             let ssim = ssim(&truth, &prediction, exposure)?;
             let difference = PixelDifference::new(&truth, &prediction)?;
-            title.push_str(&format!("   PSNR {psnr:.1} dB   SSIM {ssim:.4}"));
+            title.push_str(&format!(", PSNR {psnr:.1} dB, SSIM {ssim:.4}"));
             report["psnr"] = if psnr.is_finite() { json!(psnr) } else { json!(psnr.to_string()) };
             report["ssim"] = json!(ssim);
             report["pixel_difference"] = serde_json::to_value(difference)?;
@@ -205,16 +219,15 @@ impl Render {
             ..Display::default()
         };
         let (linear, title) = (&rendered.linear, rendered.title.as_str());
-        let mut pictures = Pictures { renderer, linear, display, limit: self.limit, title };
+        let figures = self.figure_size.into();
+        let mut pictures = Pictures { renderer, linear, display, limit: self.limit, title, figures };
         let mut files = Vec::new();
         for path in &self.output {
             let mut file = AtomicFile::create(path)?;
-            let written = if is_exr(path)? {
-                pictures.write_exr(&mut file, self.show)
-            } else if self.compare {
-                pictures.write_comparison(&mut file)
-            } else {
-                pictures.write_png(&mut file, self.show)
+            let written = match PictureFile::of(path)? {
+                PictureFile::Exr => pictures.write_exr(&mut file, self.show),
+                PictureFile::Figure(format) if self.compare => pictures.write_comparison(&mut file, format),
+                PictureFile::Figure(format) => pictures.write_figure(&mut file, self.show, format),
             };
             written.with_context(|| format!("cannot write \"{}\"", path.display()))?;
             files.push(file);
@@ -224,7 +237,7 @@ impl Render {
 
     fn say(&self, report: &Value, terminal: &Terminal) -> Result<()> {
         if self.json {
-            return terminal.print(&format!("{}\n", serde_json::to_string_pretty(report)?));
+            return terminal.print(&to_json(report)?);
         }
         if let (Some(psnr), Some(ssim)) = (report["psnr"].as_f64(), report["ssim"].as_f64()) {
             terminal.summary(&format!("PSNR {} dB, SSIM {}", significant(psnr, 4), significant(ssim, 4)))?;
@@ -300,16 +313,18 @@ impl Render {
             }
             _ => None,
         };
-        let mut prediction = None;
+        let (mut prediction, mut name) = (None, source.name.clone());
         if needs_prediction {
             if !is_model {
                 self.model.check(source)?;
             }
             let baking = Some(Baking { backend: self.backend, sigma: true });
             let job = Job { keep_model: true, baking, ..Job::new(source, &self.model) };
-            prediction = run.job(&job)?.baked;
+            let outcome = run.job(&job)?;
+            name = title(&source.name, &outcome.fitted.model);
+            prediction = outcome.baked;
         }
-        Ok(Materials { truth, prediction })
+        Ok(Materials { title: name, truth, prediction })
     }
 
     fn accumulate(&self, renderer: &mut Renderer) -> Result<()> {
@@ -339,12 +354,4 @@ fn set_materials(
         (None, None) => bail!("{}: nothing to render", source.origin()),
     }
     Ok(())
-}
-
-fn is_exr(path: &Path) -> Result<bool> {
-    match path.extension() {
-        Some(png) if png.eq_ignore_ascii_case("png") => Ok(false),
-        Some(exr) if exr.eq_ignore_ascii_case("exr") => Ok(true),
-        _ => bail!("\"{}\": expected a name that ends in .png or .exr", path.display()),
-    }
 }

@@ -4,14 +4,16 @@ use std::io::Write;
 
 use anyhow::Result;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, panel_figure, round_limit, write_rgba_png};
+use gpbrdf_core::figure::{
+    Colormap, Figure, FigureFormat, FigureOptions, Panel, Picture, Scale, round_limit, write_rgba_png,
+};
 use gpbrdf_core::formats::write_image_exr;
 use gpbrdf_render::{Background, Display, LinearPicture, LinearPixel, Renderer};
 
 use super::choices::ShowName;
 
 /// The formula of the difference, as figures state it.
-const DIFFERENCE: &str = "prediction - truth, linear, mean of R, G, B; 1 = white";
+const DIFFERENCE: &str = "prediction − truth in linear light, mean of R, G and B; 1 is white";
 
 /// A rendered picture and how to show it.
 pub(super) struct Pictures<'a> {
@@ -21,6 +23,7 @@ pub(super) struct Pictures<'a> {
     /// End of the scale of false colours, if it is not chosen by the values.
     pub(super) limit: Option<f32>,
     pub(super) title: &'a str,
+    pub(super) figures: FigureOptions,
 }
 
 impl Pictures<'_> {
@@ -42,21 +45,30 @@ impl Pictures<'_> {
     }
 
     /// Writes a figure of truth, prediction and difference.
-    pub(super) fn write_comparison(&mut self, file: &mut AtomicFile) -> Result<()> {
+    pub(super) fn write_comparison(&mut self, file: &mut AtomicFile, format: FigureFormat) -> Result<()> {
         let shown = [ShowName::Truth, ShowName::Prediction, ShowName::Difference];
         let panels = shown.into_iter().map(|show| self.panel(show)).collect::<Result<Vec<_>>>()?;
-        Ok(panel_figure(self.title, &panels, &format!("difference: {DIFFERENCE}")).write_png(file)?)
+        let figure = Figure::of_panels(self.title, panels, format!("Difference: {DIFFERENCE}."));
+        Ok(figure.write(file, format, &self.figures)?)
     }
 
-    /// Writes a picture as shown; one in false colours as a figure with its scale.
-    pub(super) fn write_png(&mut self, file: &mut AtomicFile, show: ShowName) -> Result<()> {
+    /// Writes a picture as shown; one in false colours, or as vectors, as a figure.
+    pub(super) fn write_figure(
+        &mut self,
+        file: &mut AtomicFile,
+        show: ShowName,
+        format: FigureFormat,
+    ) -> Result<()> {
         let note = match show {
-            ShowName::Sigma => "weighted by reflected light",
-            ShowName::Difference => DIFFERENCE,
-            ShowName::Truth | ShowName::Prediction => return self.write_plain(file, show),
+            ShowName::Sigma => "Standard deviation of the logarithm, weighted by reflected light.".to_owned(),
+            ShowName::Difference => format!("Difference: {DIFFERENCE}."),
+            ShowName::Truth | ShowName::Prediction if format == FigureFormat::Png => {
+                return self.write_plain(file, show);
+            }
+            ShowName::Truth | ShowName::Prediction => String::new(),
         };
         let panel = self.panel(show)?;
-        Ok(panel_figure(self.title, &[panel], note).write_png(file)?)
+        Ok(Figure::of_panels(self.title, vec![panel], note).write(file, format, &self.figures)?)
     }
 
     fn write_plain(&mut self, file: &mut AtomicFile, show: ShowName) -> Result<()> {
@@ -77,7 +89,7 @@ impl Pictures<'_> {
             ShowName::Prediction => ("prediction", None),
             ShowName::Sigma => {
                 let high = self.limit_of(self.linear.raster().map(|pixel| pixel.sigma).pixels());
-                ("sigma", Some(Scale { map: Colormap::Sequential, low: 0.0, high }))
+                ("standard deviation", Some(Scale { map: Colormap::Sequential, low: 0.0, high }))
             }
             ShowName::Difference => {
                 let high = self.limit_of(&self.linear.difference(self.display.exposure));
@@ -87,7 +99,11 @@ impl Pictures<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "shaders compute in single precision")]
         let limit = scale.map(|scale| scale.high as f32);
         let pixels = self.renderer.read_display(&Display { show: show.into(), limit, ..self.display })?;
-        Ok(Panel { picture: self.picture(&pixels), caption, scale })
+        let picture = self.picture(&pixels);
+        Ok(match scale {
+            Some(scale) => Panel::scaled(caption, picture, scale),
+            None => Panel::picture(caption, picture),
+        })
     }
 
     /// The end of the scale of these values.

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result};
 use eframe::egui::{ColorImage, Context, Rect};
 use gpbrdf_core::Rgb;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::figure::{Colormap, Panel, Picture, Scale, Slice, panel_figure, slice_figure};
+use gpbrdf_core::figure::{Figure, FigureOptions, Panel, Picture, Scale, Slice, slice_figure};
 use gpbrdf_core::formats::write_image_exr;
 use gpbrdf_render::LinearPixel;
 
@@ -56,7 +56,8 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
     let options = look.options();
     write(outbox, move || {
         let truth = truth.as_ref().and_then(Truth::brdf);
-        let picture = slice_figure(&name, truth, fitted.mean.as_ref(), &options)?;
+        let picture =
+            slice_figure(&name, truth, fitted.mean.as_ref(), &options)?.picture(&FigureOptions::default())?;
         let mut files = vec![png_file(&path, &picture)?];
         let size = [options.size; 2];
         let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
@@ -83,21 +84,18 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
 pub(crate) fn picture(name: &str, whole: &Whole, path: &Path, outbox: &Outbox<Saved>) {
     let (name, whole, path) = (name.to_owned(), whole.clone(), path.with_extension("png"));
     write(outbox, move || {
-        let high = f64::from(whole.limits.difference);
-        let scale = Scale { map: Colormap::Diverging, low: -high, high };
-        let shown = [
-            ("truth", &whole.truth, None),
-            ("prediction", &Some(whole.prediction), None),
-            ("difference", &whole.difference, Some(scale)),
-        ];
-        let panels = shown.into_iter().filter_map(|(caption, image, scale)| {
-            Some(Panel { picture: picture_of(image.as_ref()?), caption, scale })
-        });
-        let note = match &whole.difference {
-            Some(_) => "difference: exposure x (prediction - truth), linear, mean of R, G, B",
-            None => "",
-        };
-        let picture = panel_figure(&name, &panels.collect::<Vec<_>>(), note);
+        let mut panels = Vec::new();
+        if let Some(truth) = &whole.truth {
+            panels.push(Panel::picture("truth", picture_of(truth)));
+        }
+        panels.push(Panel::picture("prediction", picture_of(&whole.prediction)));
+        let mut note = "";
+        if let Some(difference) = &whole.difference {
+            let scale = Scale::signed(f64::from(whole.limits.difference));
+            panels.push(Panel::scaled("difference", picture_of(difference), scale));
+            note = "difference: exposure x (prediction - truth), linear, mean of R, G, B";
+        }
+        let picture = Figure::of_panels(name, panels, note).picture(&FigureOptions::default())?;
         let mut files = vec![png_file(&path, &picture)?];
         let raster = whole.linear.raster();
         let mut linear = |which: &str, value: fn(&LinearPixel) -> [f32; 3]| -> Result<()> {
