@@ -131,6 +131,7 @@ fn every_format_repeats_to_the_byte_and_states_its_size() {
             assert_eq!(svg.matches(&text).count(), count.count(), "{name}");
         }
         assert!(pdf.starts_with(b"%PDF-1.7") && pdf.ends_with(b"%%EOF"));
+        #[expect(clippy::cast_possible_truncation, reason = "PDF writers keep lengths in single precision")]
         let box_of_page = format!("/MediaBox [0 0 {}", page.width as f32);
         assert!(String::from_utf8_lossy(&pdf).contains(&box_of_page), "{box_of_page}");
     }
