@@ -77,7 +77,7 @@ const SCENES: [Scene; 14] = [
         after: Some(Duration::from_secs(2)),
         ..PLAIN
     },
-    Scene { name: "check-data", open: &[MEASURED], settings: r#"{"view": "data"}"#, ..PLAIN },
+    Scene { name: "viewer-data", open: &[MEASURED], settings: r#"{"view": "data"}"#, ..PLAIN },
     Scene { name: "check-glossy", open: &["silver-paint"], ..PLAIN },
     Scene {
         name: "check-five-materials",
