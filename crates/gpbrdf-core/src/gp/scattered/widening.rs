@@ -15,10 +15,10 @@ use {
 };
 
 /// Number of powers of two at which factors are known.
-const OCTAVES: usize = 7;
+const OCTAVES: usize = 11;
 
 /// Factors of the standard deviation of the noise-free function, by how much the samples leave open: at standard
-/// deviations of `2^-6`, `2^-5`, ... 1 of the kernel's own, linear between them in the logarithm and constant beyond.
+/// deviations of `2^-10`, `2^-9`, ... 1 of the kernel's own, linear between them in the logarithm and constant beyond.
 ///
 /// A process takes its hyper-parameters as certain and its function as equally smooth everywhere. Where no sample is
 /// near, its intervals are therefore too narrow: the lobes of a material are steeper than what the kernel learns from
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn factors_are_linear_between_octaves_and_constant_beyond() {
-        let rising = [1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 4.0];
+        let rising: [f64; OCTAVES] = std::array::from_fn(|k| [1.0, 2.0, 4.0][k.saturating_sub(OCTAVES - 3)]);
         let widening = Widening { edge: 0.4, highlight: [3.0; OCTAVES], rest: rising };
         let factor = |x: f64, deviation: f64| {
             (widening.widened(x, 9.0 * deviation * deviation, 9.0) / 9.0).sqrt() / deviation
@@ -246,7 +246,10 @@ mod tests {
             .collect();
         let Widening { edge, highlight, rest } = Widening::of(&samples, 0.2, 1.0);
         assert_eq!(edge, 0.2);
-        assert!((rest[6] - 2.0).abs() < 0.06 && rest[..4].iter().all(|f| *f == 1.0), "{rest:?}");
-        assert!((highlight[6] - 3.0).abs() < 0.1, "{highlight:?}");
+        assert!(
+            (rest[OCTAVES - 1] - 2.0).abs() < 0.06 && rest[..OCTAVES - 3].iter().all(|f| *f == 1.0),
+            "{rest:?}"
+        );
+        assert!((highlight[OCTAVES - 1] - 3.0).abs() < 0.1, "{highlight:?}");
     }
 }
