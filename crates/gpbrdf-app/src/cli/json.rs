@@ -10,6 +10,19 @@ use serde_json::{Map, Value};
 /// # Errors
 /// Those of the value.
 pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
+    Ok(format!("{}\n", serde_json::to_string_pretty(&noted(value)?)?))
+}
+
+/// The same JSON in a single line, with its end.
+///
+/// # Errors
+/// Those of the value.
+pub(super) fn to_json_line(value: &impl Serialize) -> Result<String> {
+    Ok(format!("{}\n", serde_json::to_string(&noted(value)?)?))
+}
+
+/// A value with `null` and notes in place of what is no number of JSON.
+fn noted(value: &impl Serialize) -> Result<Value> {
     let mut value = serde_json::to_value(value)?;
     let mut notes = Map::new();
     take_names(&mut value, "", false, &mut notes);
@@ -18,7 +31,7 @@ pub(super) fn to_json(value: &impl Serialize) -> Result<String> {
     {
         object.insert("notes".to_owned(), Value::Object(notes));
     }
-    Ok(format!("{}\n", serde_json::to_string_pretty(&value)?))
+    Ok(value)
 }
 
 /// Replaces the names of numbers under keys of a PSNR by `null` and adds them to the notes, under the path to the key.
@@ -57,6 +70,9 @@ mod tests {
             "notes": { "m.psnr": "inf", "m.psnr_of[0]": "NaN" },
         });
         assert_eq!(read, expected);
+        let line = to_json_line(&given).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&line).unwrap(), expected);
+        assert!(line.ends_with("}\n") && line.lines().count() == 1, "{line}");
         assert_eq!(to_json(&json!({ "a": "b" })).unwrap(), "{\n  \"a\": \"b\"\n}\n");
     }
 }

@@ -22,6 +22,7 @@ use self::memory::Memory;
 use self::part::Part;
 use self::record::{End, Line, Record};
 use super::input::open;
+use super::json::to_json_line;
 use super::making::{Making, Product, Wanted};
 use super::one_line;
 use super::terminal::Terminal;
@@ -220,7 +221,7 @@ impl Work<'_> {
 
     /// Writes a line to standard output and, if it is new, to the record.
     fn tell(&self, line: &Line, is_new: bool) -> Result<()> {
-        let text = format!("{}\n", serde_json::to_string(line)?);
+        let text = to_json_line(line)?;
         if is_new {
             self.record.append(&text)?;
         }
@@ -236,6 +237,7 @@ impl Work<'_> {
             sha256,
             options: self.options.clone(),
             seconds: Value::Null,
+            notes: Value::Null,
             end: End::Failed { error: String::new() },
         };
         line.end = self

@@ -24,6 +24,9 @@ pub(super) struct Line {
     pub(super) options: Value,
     /// Wall-clock seconds of each stage, and of all.
     pub(super) seconds: Value,
+    /// Numbers that JSON cannot hold, by the keys that are null for them.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    pub(super) notes: Value,
     #[serde(flatten)]
     pub(super) end: End,
 }
