@@ -144,7 +144,7 @@ fn main() -> Result<()> {
     }
     names.truncate(SPHERES.len());
     names.push("lambert".to_owned());
-    let options = MaterialOptions { energy_conserving: true, ..MaterialOptions::default() };
+    let options = MaterialOptions { energy_conserving: true };
     let open = |name: &String| {
         let source = Source::built_in(name).or_else(|_| Source::open(name))?;
         source.material(&options)
@@ -160,15 +160,15 @@ fn main() -> Result<()> {
         ("fitted GGX and cosine", with(&|material| Sampler::Ggx(Ggx::fitted(material)), PATHS, 3)),
         ("own densities", with(&|material| Sampler::Own(material), PATHS, 4)),
     ];
-    let mut image = image::RgbImage::new((3 * WIDTH) as u32, HEIGHT as u32);
-    for (place, (name, picture)) in pictures.iter().enumerate() {
+    for (name, picture) in &pictures {
         println!("{name}: root mean square error {:.2} of 255", error(picture, &reference));
-        for (pixel, light) in picture.iter().enumerate() {
-            let (x, y) = (place * WIDTH + pixel % WIDTH, pixel / WIDTH);
-            image.put_pixel(x as u32, y as u32, image::Rgb(light.map(encoded)));
-        }
     }
-    image.save(&out).map_err(|error| Error::Io {
+    let rows =
+        (0..HEIGHT).flat_map(|y| pictures.iter().map(move |(_, picture)| &picture[y * WIDTH..][..WIDTH]));
+    let bytes: Vec<u8> = rows.flatten().flat_map(|light| light.map(encoded)).collect();
+    let [width, height] = [3 * WIDTH, HEIGHT].map(|size| u32::try_from(size).unwrap_or(u32::MAX));
+    let saved = image::save_buffer(&out, &bytes, width, height, image::ColorType::Rgb8);
+    saved.map_err(|error| Error::Io {
         action: "cannot write",
         path: out.clone(),
         source: std::io::Error::other(error),
