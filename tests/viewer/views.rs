@@ -45,14 +45,14 @@ fn hovered_values_are_those_of_the_model() {
         driver.harness.hover_at(slice.lerp_inside(egui::Vec2::from(shares)));
         driver.harness.run_steps(4);
         let texts = driver.texts();
+        // The values are the last texts; other texts may have the same names.
+        let texts_from = texts.iter().rposition(|t| t == "θh").unwrap();
+        let texts = &texts[texts_from..];
         let read = |name: &str| -> Vec<f64> {
             let at = texts.iter().position(|t| t == name).unwrap_or_else(|| panic!("no {name} in {texts:?}"));
             let numbers = texts[at + 1].split_whitespace();
             numbers.map(|x| x.trim_end_matches('°').parse().unwrap()).collect()
         };
-        // The values are the last texts; other texts may have the same names.
-        let texts_from = texts.iter().rposition(|t| t == "θh").unwrap();
-        let texts = &texts[texts_from..];
         let angle = |name: &str| -> f64 {
             let at = texts.iter().position(|t| t == name).unwrap();
             texts[at + 1].trim_end_matches('°').parse::<f64>().unwrap().to_radians()
