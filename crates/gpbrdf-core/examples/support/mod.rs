@@ -118,6 +118,16 @@ pub(crate) fn unit(random: &mut SplitMix64) -> f32 {
 }
 
 impl Sampler<'_> {
+    /// The density of [`Sampler::draw`] at a direction above the surface, 1/sr.
+    #[allow(dead_code, reason = "not every example weights densities")]
+    pub(crate) fn pdf(&self, material: &Material, wi: Direction, wo: Direction) -> f32 {
+        match self {
+            Self::Own(_) => material.pdf(wi, wo),
+            Self::Cosine => wi[2] / std::f32::consts::PI,
+            Self::Ggx(ggx) => ggx.density(wi, wo),
+        }
+    }
+
     /// A direction and `f cos / pdf`.
     pub(crate) fn draw(
         &self,
