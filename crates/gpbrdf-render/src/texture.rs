@@ -1,10 +1,10 @@
 //! A BRDF as a 3-D texture.
 
+use gpbrdf_core::base::to_halves;
 use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
 use gpbrdf_core::formats::texels;
 use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
-use half::slice::HalfFloatSliceExt;
 
 use crate::context::Context;
 use crate::error::Result;
@@ -181,16 +181,6 @@ impl BrdfTexture {
             ..Default::default()
         })
     }
-}
-
-/// The nearest numbers of half precision, as by [`gpbrdf_core::base::to_half`] but several at a time: where the
-/// processor converts them itself, a table takes a tenth of the time.
-fn to_halves(values: &[f32]) -> Vec<f16> {
-    let largest = f16::MAX.to_f32();
-    let finite: Vec<f32> = values.iter().map(|x| x.clamp(-largest, largest)).collect();
-    let mut halves = vec![f16::ZERO; finite.len()];
-    halves.convert_from_f32_slice(&finite);
-    halves
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use anyhow::Result;
-use gpbrdf_core::base::{Raster, SplitMix64};
+use gpbrdf_core::base::{Raster, SplitMix64, quasi_random_pair};
 use gpbrdf_core::figure::{Colormap, Figure, Panel, Picture, Rgb8, Scale, round_limit};
 use gpbrdf_core::judge::{Image, ShadingFrame, exposed_difference, exposure_of};
 use gpbrdf_core::nalgebra::Vector3;
@@ -28,10 +28,6 @@ const RAYS: usize = 16;
 /// Angle of view in radians, and the part of the frame that the sphere takes: those of `render`.
 const VIEW: f32 = 0.55;
 const FILL: f32 = 0.88;
-/// Steps of an additive recurrence that fills a square evenly: reciprocal powers of the root of `x^3 = x + 1`. M.
-/// Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
-const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
-
 /// What is shown.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Subject<'a> {
@@ -177,11 +173,6 @@ impl Lamp {
     }
 }
 
-/// Where a direction is on a latitude-longitude map, from 0 to 1 across and down.
-fn coordinates(w: &Vector3<f64>) -> [f64; 2] {
-    [w.x.atan2(-w.z) / TAU + 0.5, w.x.hypot(w.z).atan2(w.y) / PI]
-}
-
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "t is in [0, 1]")]
 fn index(t: f64, count: usize) -> usize {
     ((t * count as f64) as usize).min(count.saturating_sub(1))
@@ -225,8 +216,7 @@ fn on_processor(subject: &Subject<'_>, environment: &Environment) -> Result<Rast
             let mut sums = vec![[0.0; 3]; tables.len()];
             let mut hits = 0.0;
             for k in 0..RAYS {
-                let of = |shift: [f64; 2]| std::array::from_fn(|j| (shift[j] + k as f64 * STEPS[j]).fract());
-                let [within, by_lamp, by_material]: [[f64; 2]; 3] = shifts.map(of);
+                let [within, by_lamp, by_material] = shifts.map(|shift| quasi_random_pair(shift, k));
                 let corner = [(i % SIZE) as f64, (i / SIZE) as f64];
                 let place: [f64; 2] =
                     std::array::from_fn(|j| 2.0 * (corner[j] + within[j]) / SIZE as f64 - 1.0);
@@ -273,7 +263,7 @@ fn light(
     let [a, b] = by_material.map(single);
     if let Some(drawn) = material.sample(wo.map(single).into(), a, b) {
         let w = frame.to_world(&Vector3::from(drawn.wi.map(f64::from)));
-        add(&w, lamp.from(coordinates(&w)), f64::from(drawn.pdf));
+        add(&w, lamp.from(Environment::coordinates(&w)), f64::from(drawn.pdf));
     }
 }
 
@@ -290,32 +280,9 @@ fn shown(
         let pixel = pixels.at(x, y);
         let place =
             [2.0 * (x as f64 + 0.5) / width as f64 - 1.0, 1.0 - 2.0 * (y as f64 + 0.5) / height as f64];
-        let around = background(environment, coordinates(&ray(&camera, place)));
+        let around = environment.interpolated(Environment::coordinates(&ray(&camera, place)));
         let [inside, around] = [of(pixel).map(f64::from), around].map(|rgb| encoded(rgb, exposure));
         mixed(around, inside, f64::from(pixel.coverage))
-    })
-}
-
-/// The radiance of the map, interpolated linearly between pixels.
-fn background(environment: &Environment, [u, v]: [f64; 2]) -> Rgb {
-    let map = environment.raster();
-    let (width, height) = (map.width() as f64, map.height() as f64);
-    let (x, y) = (u * width - 0.5, v * height - 0.5);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "wrapped and clamped to the map"
-    )]
-    let at = |column: f64, row: f64| {
-        let column = (column.rem_euclid(width) as usize).min(map.width() - 1);
-        map.at(column, row.clamp(0.0, height - 1.0) as usize).map(f64::from)
-    };
-    let (left, top) = (x.floor(), y.floor());
-    let (across, down) = (x - left, y - top);
-    let four = [at(left, top), at(left + 1.0, top), at(left, top + 1.0), at(left + 1.0, top + 1.0)];
-    let mix = |a: f64, b: f64, t: f64| a + t * (b - a);
-    std::array::from_fn(|c| {
-        mix(mix(four[0][c], four[1][c], across), mix(four[2][c], four[3][c], across), down)
     })
 }
 

@@ -77,6 +77,14 @@ pub fn quasi_random(i: usize) -> [f64; 3] {
     STEPS.map(|step| (0.5 + step * i as f64).fract())
 }
 
+/// Point `i` of an additive recurrence from `start` that fills the unit square evenly: `frac(start + i g^-k)` for
+/// `k = 1, 2`, where `g^3 = g + 1`. Source: that of [`quasi_random`].
+#[must_use]
+pub fn quasi_random_pair(start: [f64; 2], i: usize) -> [f64; 2] {
+    const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_3];
+    std::array::from_fn(|k| (start[k] + STEPS[k] * i as f64).fract())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,5 +1,6 @@
 //! Axes: which numbers they have ticks at, and where a value is along them.
 
+use super::scale::round_step;
 use crate::base::number::short;
 
 /// How values are spaced along an axis.
@@ -123,13 +124,6 @@ impl Ruled {
     }
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is at least `x`.
-fn round_step(x: f64) -> f64 {
-    let power = 10f64.powf(x.log10().floor());
-    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= x * (1.0 - 1e-9));
-    step.unwrap_or(10.0) * power
-}
-
 type Ticks = ([f64; 2], Vec<(f64, String)>, Vec<f64>);
 
 /// Ends and ticks at multiples of a round step.
@@ -158,18 +152,9 @@ fn linear_label(x: f64, step: f64) -> String {
 
 /// Ends and ticks at powers of ten; at twice and five times them, too, where there are few.
 fn logarithmic_ticks(low: f64, high: f64, most: usize) -> Ticks {
-    let round = |x: f64, up: bool| {
-        let power = 10f64.powf(x.log10().floor());
-        let mantissa = x / power;
-        let steps = [1.0, 2.0, 5.0, 10.0];
-        let found = if up {
-            steps.into_iter().find(|&step| step >= mantissa * (1.0 - 1e-9))
-        } else {
-            steps.into_iter().rev().find(|&step| step <= mantissa * (1.0 + 1e-9))
-        };
-        found.unwrap_or(1.0) * power
-    };
-    let ends = [round(low, false), round(high, true)];
+    let power = 10f64.powf(low.log10().floor());
+    let below = [10.0, 5.0, 2.0].into_iter().find(|step| step * power <= low * (1.0 + 1e-9)).unwrap_or(1.0);
+    let ends = [below * power, round_step(high)];
     #[expect(clippy::cast_possible_truncation, reason = "exponents of doubles")]
     let decade = |x: f64| x.log10().round() as i32;
     let [first, last] =

@@ -28,6 +28,6 @@ pub use comparison::{slice_figure, sphere_figure};
 pub use panel::{Body, Panel, Scale};
 pub use picture::{Picture, Rgb8, write_moving_png, write_rgba_png};
 pub use plot::{Curve, Plot};
-pub use scale::round_limit;
+pub use scale::{round_limit, round_step};
 pub use sheet::{Figure, FigureFormat, FigureOptions, Row};
 pub use slice::{Slice, SliceOptions};

@@ -1,6 +1,14 @@
-//! The limits of colour scales.
+//! Round numbers: steps of axes and limits of colour scales.
 
 use crate::judge::image_metrics::percentile;
+
+/// The smallest of 1, 2 and 5 times a power of ten that is at least `x`, which is positive.
+#[must_use]
+pub fn round_step(x: f64) -> f64 {
+    let power = 10f64.powf(x.log10().floor());
+    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= x * (1.0 - 1e-9));
+    step.unwrap_or(10.0) * power
+}
 
 /// The limit of a colour scale: the smallest number of the form 1, 2 or 5 times a power of ten that is at
 /// least the 99th percentile of the finite absolute values in `mask`, and at least 1e-6.
@@ -14,10 +22,7 @@ pub fn round_limit(values: &[f64], mask: &[bool]) -> f64 {
         sizes.select_nth_unstable_by(cut, f64::total_cmp);
         sizes[cut..].sort_unstable_by(f64::total_cmp);
     }
-    let level = percentile(&sizes, 0.99).max(1e-6);
-    let power = 10.0f64.powf(level.log10().floor());
-    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= level * (1.0 - 1e-9)).unwrap_or(10.0);
-    step * power
+    round_step(percentile(&sizes, 0.99).max(1e-6))
 }
 
 #[cfg(test)]

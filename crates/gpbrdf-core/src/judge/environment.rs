@@ -79,7 +79,7 @@ impl Environment {
         let raster = Raster::from_fn(width, height, |column, row| {
             let u = (column as f64 + 0.5) / width as f64;
             let v = (row as f64 + 0.5) / height as f64;
-            narrow(studio_radiance(&lat_long(u, v)))
+            narrow(studio_radiance(&Self::direction(u, v)))
         });
         Self { raster }
     }
@@ -88,6 +88,45 @@ impl Environment {
     #[must_use]
     pub fn raster(&self) -> &Raster<[f32; 3]> {
         &self.raster
+    }
+
+    /// The unit direction at `(u, v)`, by the convention of this module.
+    #[must_use]
+    pub fn direction(u: f64, v: f64) -> Vector3<f64> {
+        let (sin_t, cos_t) = (PI * v).sin_cos();
+        let (sin_p, cos_p) = (TAU * (u - 0.5)).sin_cos();
+        Vector3::new(sin_t * sin_p, cos_t, -sin_t * cos_p)
+    }
+
+    /// `u` and `v` of a direction of any length, each in `[0, 1]`, by the convention of this module.
+    #[must_use]
+    pub fn coordinates(direction: &Vector3<f64>) -> [f64; 2] {
+        let [x, y, z]: [f64; 3] = (*direction).into();
+        [x.atan2(-z) / TAU + 0.5, x.hypot(z).atan2(y) / PI]
+    }
+
+    /// The radiance at `(u, v)`, linear between the middles of pixels: the map is closed from left to right, and
+    /// constant beyond its first and last row.
+    #[must_use]
+    pub fn interpolated(&self, [u, v]: [f64; 2]) -> Rgb {
+        let (width, height) = (self.raster.width() as f64, self.raster.height() as f64);
+        let (x, y) = (u * width - 0.5, v * height - 0.5);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "wrapped and clamped to the map"
+        )]
+        let at = |column: f64, row: f64| {
+            let column = (column.rem_euclid(width) as usize).min(self.raster.width() - 1);
+            self.raster.at(column, row.clamp(0.0, height - 1.0) as usize).map(f64::from)
+        };
+        let (left, top) = (x.floor(), y.floor());
+        let (across, down) = (x - left, y - top);
+        let four = [at(left, top), at(left + 1.0, top), at(left, top + 1.0), at(left + 1.0, top + 1.0)];
+        let mix = |a: f64, b: f64, t: f64| a + t * (b - a);
+        std::array::from_fn(|c| {
+            mix(mix(four[0][c], four[1][c], across), mix(four[2][c], four[3][c], across), down)
+        })
     }
 
     /// The map averaged to `columns x rows` pixels, as by [`Environment::average_to`].
@@ -123,7 +162,7 @@ impl Environment {
             for (column, spans) in across.iter().enumerate() {
                 let u = (column as f64 + 0.5) / columns as f64;
                 patches.push(EnvDirection {
-                    direction: lat_long(u, 0.5 * (top + bottom)),
+                    direction: Self::direction(u, 0.5 * (top + bottom)),
                     radiance: self.mean_over(&down, spans),
                     solid_angle: band * TAU / columns as f64,
                 });
@@ -161,13 +200,6 @@ impl Environment {
         }
         sum.map(|x| x / total)
     }
-}
-
-/// The direction at `(u, v)`, by the convention of this module.
-fn lat_long(u: f64, v: f64) -> Vector3<f64> {
-    let (sin_t, cos_t) = (PI * v).sin_cos();
-    let (sin_p, cos_p) = (TAU * (u - 0.5)).sin_cos();
-    Vector3::new(sin_t * sin_p, cos_t, -sin_t * cos_p)
 }
 
 /// The formula of [`Environment::studio`].
@@ -240,11 +272,29 @@ mod tests {
 
     #[test]
     fn the_axes_are_where_the_convention_says() {
-        let gap = |u, v, x, y, z| (lat_long(u, v) - Vector3::new(x, y, z)).norm();
+        let gap = |u, v, x, y, z| (Environment::direction(u, v) - Vector3::new(x, y, z)).norm();
         assert!(gap(0.5, 0.5, 0.0, 0.0, -1.0) < 1e-15);
         assert!(gap(0.75, 0.5, 1.0, 0.0, 0.0) < 1e-15);
         assert!(gap(0.3, 0.0, 0.0, 1.0, 0.0) < 1e-15);
         assert!(gap(0.0, 0.5, 0.0, 0.0, 1.0) < 1e-15);
+    }
+
+    #[test]
+    fn directions_have_their_coordinates_and_values_are_linear_between_pixels() {
+        for (u, v) in [(0.1, 0.2), (0.5, 0.5), (0.93, 0.77)] {
+            let [a, b] = Environment::coordinates(&(3.0 * Environment::direction(u, v)));
+            assert!((a - u).abs() < 1e-12 && (b - v).abs() < 1e-12, "{a} {b}");
+        }
+        let map = Environment::new(Raster::from_fn(8, 4, |x, y| [x as f32, y as f32, 1.0])).unwrap();
+        let close = |at: [f64; 2], expected: Rgb| {
+            let found = map.interpolated(at);
+            assert!((0..3).all(|c| (found[c] - expected[c]).abs() < 1e-12), "{at:?}: {found:?}");
+        };
+        close([2.5 / 8.0, 1.5 / 4.0], [2.0, 1.0, 1.0]);
+        close([2.75 / 8.0, 1.75 / 4.0], [2.25, 1.25, 1.0]);
+        // Between the last and the first column, and at the poles.
+        close([0.0, 0.0], [3.5, 0.0, 1.0]);
+        close([1.0, 1.0], [3.5, 3.0, 1.0]);
     }
 
     #[test]

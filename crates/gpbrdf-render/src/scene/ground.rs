@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use gpbrdf_core::Environment;
-use gpbrdf_core::base::Raster;
+use gpbrdf_core::base::{Raster, quasi_random_pair};
 use rayon::prelude::*;
 
 use super::gbuffer::Geometry;
@@ -121,11 +121,9 @@ fn beams(environment: &Environment, count: usize) -> Vec<Beam> {
         sum += weight;
         while sum > next && found.len() < count {
             // Within the patch, so that shadows of one patch do not fall on one line.
-            let k = found.len() as f64;
-            let part = |step: f64| (0.5 + k * step).fract() - 0.5;
             let size = std::f64::consts::TAU / PATCHES.0 as f64;
+            let [turn, lift] = quasi_random_pair([0.5; 2], found.len()).map(|part| size * (part - 0.5));
             let d = patch.direction;
-            let (turn, lift) = (size * part(0.754_877_666), size * part(0.569_840_291));
             let polar = (d.y.clamp(-1.0, 1.0).acos() + lift).clamp(0.0, 1.55);
             let azimuth = d.z.atan2(d.x) + turn;
             let direction = Vec3::new(

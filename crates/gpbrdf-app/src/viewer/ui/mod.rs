@@ -1,5 +1,6 @@
 //! What is drawn. Functions named `*_ui` draw and never wait.
 
+pub(crate) mod half_disc;
 pub(crate) mod hint;
 pub(crate) mod layout;
 pub(crate) mod menu;

@@ -7,6 +7,9 @@ pub(crate) const ERROR: Color32 = Color32::from_rgb(0xB0, 0x30, 0x24);
 pub(crate) const NOTE: Color32 = Color32::from_rgb(0x2C, 0x5F, 0x8A);
 pub(crate) const DONE: Color32 = Color32::from_rgb(0x26, 0x6B, 0x46);
 
+/// The direction of the light, in plots of both themes.
+pub(crate) const LIGHT: Color32 = Color32::from_rgb(0xD0, 0x9A, 0x10);
+
 /// The colours of a theme: those of egui, with text that has a contrast of at least 4.5 to what is behind it.
 pub(crate) fn visuals(theme: Theme) -> Visuals {
     let gray = Color32::from_gray;

@@ -2,6 +2,7 @@
 
 use eframe::egui::Visuals;
 use egui_plot::{AxisHints, GridInput, GridMark};
+use gpbrdf_core::figure::round_step;
 
 /// Points of the window between two marks of the finest grid that egui draws, which [`GridInput::base_step_size`] is.
 const FINEST: f64 = 8.0;
@@ -17,10 +18,7 @@ fn points_per_unit(input: &GridInput) -> f64 {
 
 /// Marks of an axis at 1, 2 and 5 times powers of ten. `apart` is the least number of points between two of them.
 pub(crate) fn linear_marks(input: &GridInput, apart: f64) -> Vec<GridMark> {
-    let least = apart / points_per_unit(input);
-    let power = 10f64.powf(least.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|step| *step >= least);
-    stepped(input, step.unwrap_or(10.0 * power))
+    stepped(input, round_step(apart / points_per_unit(input)))
 }
 
 /// Marks of an axis of degrees at steps that divide a right angle.

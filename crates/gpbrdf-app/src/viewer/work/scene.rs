@@ -4,7 +4,7 @@
 //! It uses a second device. On the window's device, long dispatches would delay presentation, and wgpu cannot
 //! configure a surface while another thread submits work.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use eframe::egui::{Color32, ColorImage};
 use glam::Vec3;
 use gpbrdf_core::base::Raster;
 use gpbrdf_core::figure::round_limit;
+use gpbrdf_core::nalgebra::Vector3;
 use gpbrdf_core::{BrdfTable, Environment, SigmaTable};
 use gpbrdf_render::{
     AdapterChoice, Background, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Ground,
@@ -552,33 +553,16 @@ fn turned(environment: &Environment, yaw: f64, pitch: f64) -> Environment {
     } else {
         let ((sy, cy), (sp, cp)) = (yaw.sin_cos(), pitch.sin_cos());
         let pixel = |i: usize| {
-            let azimuth = TAU * ((i % width) as f64 + 0.5) / width as f64 - PI;
-            let (sine, y) = (PI * ((i / width) as f64 + 0.5) / height as f64).sin_cos();
-            let (x, z) = (sine * azimuth.sin(), -sine * azimuth.cos());
+            let [u, v] = [(i % width, width), (i / width, height)].map(|(i, n)| (i as f64 + 0.5) / n as f64);
+            let [x, y, z]: [f64; 3] = Environment::direction(u, v).into();
             let (y, z) = (cp * y + sp * z, cp * z - sp * y);
-            interpolated(map, [cy * x - sy * z, y, cy * z + sy * x])
+            let from = Vector3::new(cy * x - sy * z, y, cy * z + sy * x);
+            environment.interpolated(Environment::coordinates(&from)).map(to_f32)
         };
         let pixels = (0..width * height).into_par_iter().map(pixel).collect();
         Raster::new(width, height, pixels).unwrap_or_else(|_| map.clone())
     };
     Environment::new(turned).unwrap_or_else(|_| environment.clone())
-}
-
-/// The radiance of a map in a direction, between its pixels.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in a map")]
-fn interpolated(map: &Raster<[f32; 3]>, [x, y, z]: [f64; 3]) -> [f32; 3] {
-    let (width, height) = (map.width(), map.height());
-    let column = (x.atan2(-z) / TAU + 0.5) * width as f64 - 0.5;
-    let row = (x.hypot(z).atan2(y) / PI * height as f64 - 0.5).clamp(0.0, (height - 1) as f64);
-    let left = column.floor().rem_euclid(width as f64) as usize % width;
-    let columns = [left, (left + 1) % width];
-    let rows = [row as usize, (row as usize + 1).min(height - 1)];
-    let (s, t) = (to_f32(column - column.floor()), to_f32(row - row.floor()));
-    std::array::from_fn(|c| {
-        let at = |i: usize, j: usize| map.at(columns[i], rows[j])[c];
-        let line = |j: usize| at(0, j) + s * (at(1, j) - at(0, j));
-        line(0) + t * (line(1) - line(0))
-    })
 }
 
 /// The factor of radiance at which nine tenths of an object are below 0.6 of white, as in the image metrics, or a
@@ -629,6 +613,8 @@ fn to_f32(x: f64) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
-use crate::base::f16::to_half;
+use crate::base::f16::to_halves;
 use crate::brdf::SigmaTable;
 use crate::brdf::table::{BrdfTable, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
 
@@ -117,10 +117,10 @@ pub fn texels<'a>(
 
 /// Writes the texels.
 fn write_texels(to: &mut impl Write, table: &BrdfTable, sigma: Option<&SigmaTable>) -> io::Result<()> {
-    for x in texels(&table.filled(), sigma).flatten() {
-        to.write_all(&to_half(x.into()).to_le_bytes())?;
-    }
-    Ok(())
+    let values: Vec<[f32; 4]> = texels(&table.filled(), sigma).collect();
+    let bytes: Vec<u8> =
+        to_halves(values.as_flattened()).into_iter().flat_map(|half| half.to_le_bytes()).collect();
+    to.write_all(&bytes)
 }
 
 #[cfg(test)]

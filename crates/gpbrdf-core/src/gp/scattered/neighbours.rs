@@ -42,6 +42,28 @@ pub(super) struct Embedded {
     len: usize,
 }
 
+/// The points among which the nearest ones are searched.
+#[derive(Clone, Copy, Debug)]
+struct Among {
+    /// Their number: they are the first ones.
+    first: usize,
+    /// One that is left out.
+    skip: Option<usize>,
+    /// Only points at a larger squared distance are taken.
+    beyond: f64,
+}
+
+impl Among {
+    fn first(count: usize) -> Self {
+        Self { first: count, skip: None, beyond: f64::NEG_INFINITY }
+    }
+
+    #[cfg(feature = "fit")]
+    fn all_but(count: usize, skip: usize) -> Self {
+        Self { skip: Some(skip), ..Self::first(count) }
+    }
+}
+
 impl Embedded {
     /// Embeds `n` rows of coordinates. Where a kernel has several length scales along an axis, the shortest
     /// counts.
@@ -62,11 +84,11 @@ impl Embedded {
         Self { axes, len: x.len() / dimension }
     }
 
-    /// Writes the indices of the `count` points among the first `limit`, without point `skip`, that are
-    /// nearest to point `j` of `other`, nearest first. Cost: one squared distance per point.
+    /// Writes the indices of the `count` points among some that are nearest to point `j` of `other`, nearest first.
+    /// Cost: one squared distance per point.
     fn nearest(
         &self,
-        (limit, skip): (usize, Option<usize>),
+        Among { first: limit, skip, beyond }: Among,
         (other, j): (&Self, usize),
         count: usize,
         found: &mut Vec<(f64, u32)>,
@@ -98,7 +120,7 @@ impl Embedded {
                 continue;
             }
             for (offset, &d2) in d2.iter().enumerate() {
-                if d2 <= worst && Some(start + offset) != skip {
+                if d2 <= worst && d2 > beyond && Some(start + offset) != skip {
                     found.push((d2, index(start + offset)));
                 }
             }
@@ -113,21 +135,12 @@ impl Embedded {
     }
 
     /// The `count` points that are nearest to point `i` among the others that are farther from it than `radius`; among
-    /// all others where that is 0.
+    /// all others where that is 0. Nearest first.
     #[cfg(feature = "fit")]
     pub(super) fn nearest_outside(&self, i: usize, radius: f64, count: usize) -> Vec<u32> {
-        let mut squares = vec![0.0; self.len];
-        for axis in &self.axes {
-            squares.iter_mut().zip(axis).for_each(|(square, x)| *square += (x - axis[i]) * (x - axis[i]));
-        }
-        let is_outside = |j: &usize| *j != i && (radius == 0.0 || squares[*j] > radius * radius);
-        let mut found: Vec<(f64, u32)> =
-            (0..self.len).filter(is_outside).map(|j| (squares[j], index(j))).collect();
-        let order = |a: &(f64, u32), b: &(f64, u32)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        if found.len() > count {
-            found.select_nth_unstable_by(count, order);
-            found.truncate(count);
-        }
+        let beyond = if radius > 0.0 { radius * radius } else { f64::NEG_INFINITY };
+        let mut found = Vec::new();
+        self.nearest(Among { beyond, ..Among::all_but(self.len, i) }, (self, i), count, &mut found);
         found.into_iter().map(|(_, j)| j).collect()
     }
 
@@ -136,7 +149,7 @@ impl Embedded {
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
     pub(super) fn nearest_before(&self, count: usize, watch: &Watch) -> Result<Neighbours> {
-        self.of_all(self, count, watch, |i| (i, None))
+        self.of_all(self, count, watch, Among::first)
     }
 
     /// For every point, its nearest ones among all others.
@@ -145,7 +158,7 @@ impl Embedded {
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
     #[cfg(feature = "fit")]
     pub(super) fn nearest_others(&self, count: usize, watch: &Watch) -> Result<Neighbours> {
-        self.of_all(self, count, watch, |i| (self.len, Some(i)))
+        self.of_all(self, count, watch, |i| Among::all_but(self.len, i))
     }
 
     /// For every one of `points`, the nearest of these points.
@@ -153,7 +166,7 @@ impl Embedded {
     /// # Errors
     /// [`Error::Cancelled`](crate::Error::Cancelled) where the observer stops the work.
     pub(super) fn nearest_to(&self, points: &Self, count: usize, watch: &Watch) -> Result<Neighbours> {
-        self.of_all(points, count, watch, |_| (self.len, None))
+        self.of_all(points, count, watch, |_| Among::first(self.len))
     }
 
     fn of_all(
@@ -161,7 +174,7 @@ impl Embedded {
         points: &Self,
         count: usize,
         watch: &Watch,
-        among: impl Fn(usize) -> (usize, Option<usize>) + Sync,
+        among: impl Fn(usize) -> Among + Sync,
     ) -> Result<Neighbours> {
         let steps = watch.steps(points.len / STEP);
         let sets = (0..points.len).into_par_iter().map_init(Vec::new, |found, j| {

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, Align2, Color32, Context, RichText, ScrollArea, Ui};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints, PlotUi, Points, Text};
+use egui_plot::{Line, PlotPoint, PlotPoints, PlotUi, Points, Text};
 use gpbrdf_core::plan::{Device, Geometry, Plan};
 use serde::{Deserialize, Serialize};
 
 use crate::viewer::state::document::Document;
-use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
+use crate::viewer::ui::half_disc;
+use crate::viewer::ui::navigate::navigate_plot;
 use crate::viewer::ui::pane::{
     Command, Offers, Order, Pane, PaneContext, Place, Progress, Start, restored, saved,
 };
@@ -25,9 +26,6 @@ const LIST: f32 = 310.0;
 
 /// From this width on there is room for the list.
 const ROOMY: f32 = 620.0;
-
-/// The most measured directions that are drawn.
-const MOST_DRAWN: usize = 6000;
 
 /// What the pane remembers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -225,38 +223,19 @@ impl Directions {
         width: f32,
         reset: bool,
     ) -> bool {
-        let mut plot = Plot::new("hemisphere")
-            .data_aspect(1.0)
-            .width(width.max(120.0))
-            .height(ui.available_height())
-            .include_x(-98.0)
-            .include_x(98.0)
-            .include_y(-8.0)
-            .include_y(98.0)
-            .show_axes(false)
-            .show_grid(false)
-            .allow_scroll(false)
-            .allow_boxed_zoom(false)
-            .label_formatter(|_| None);
-        if reset {
-            plot = plot.reset();
-        }
+        let plot = half_disc::plot(ui, "hemisphere", reset).width(width.max(120.0));
         let weak = ui.visuals().weak_text_color();
         let strong = ui.visuals().strong_text_color();
         let response = plot.show(ui, |plot| {
-            draw_rings(plot, weak);
+            draw_frame(plot, weak);
             draw_measured(plot, document);
             if let Some(plan) = plan {
                 self.draw_planned(plot, plan, strong);
             }
             navigate_plot(plot);
         });
-        focus_ui(ui, &response.response);
         let planned = plan.map_or(0, |plan| plan.geometries.len());
-        let name = format!("Hemisphere, {planned} planned directions");
-        let info = || egui::WidgetInfo::labeled(egui::accesskit::Role::Figure, true, &name);
-        response.response.widget_info(info);
-        ViewKeys::of(ui.ctx(), &response.response).reset
+        half_disc::keys(ui, &response.response, &format!("Hemisphere, {planned} planned directions"))
     }
 
     fn draw_planned(&self, plot: &mut PlotUi<'_>, plan: &Plan, colour: Color32) {
@@ -286,44 +265,26 @@ pub(super) const PLANNED: Color32 = Color32::from_rgb(0xF0, 0x5A, 0x5A);
 /// The colour of lights.
 const LIGHT: Color32 = Color32::from_rgb(0xF0, 0xD0, 0x50);
 
-/// The place of the detector in the picture: its angle from the normal, in degrees, is the distance from the centre.
-/// The light is to the right.
+/// The place of the detector in the picture.
 fn detector(geometry: &Geometry) -> [f64; 2] {
-    place(geometry.theta_o, geometry.phi_o.to_radians())
+    half_disc::place(geometry.theta_o, geometry.phi_o.to_radians())
 }
 
-fn place(theta: f64, phi: f64) -> [f64; 2] {
-    [theta * phi.cos(), theta * phi.sin()]
-}
-
-/// Half circles of equal angle from the normal: both sides of the plane of incidence are alike.
-fn draw_rings(plot: &mut PlotUi<'_>, colour: Color32) {
-    for theta in [30.0, 60.0, 90.0] {
-        let circle: Vec<[f64; 2]> =
-            (0..=90).map(|i| place(theta, f64::from(i) * std::f64::consts::PI / 90.0)).collect();
-        let line = Line::new("ring", PlotPoints::from(circle)).color(colour).width(1.0);
-        plot.line(line.allow_hover(false));
-        let text = RichText::new(format!("{theta:.0}°")).color(colour).size(11.0);
-        let at = PlotPoint::new(0.0, theta + 1.0);
-        plot.text(Text::new("angle", at, text).anchor(Align2::CENTER_BOTTOM).allow_hover(false));
-    }
-    let base = Line::new("plane of incidence", PlotPoints::from(vec![[-90.0, 0.0], [90.0, 0.0]]));
-    plot.line(base.color(colour).width(1.0).allow_hover(false));
+/// What does not depend on the directions.
+fn draw_frame(plot: &mut PlotUi<'_>, colour: Color32) {
+    half_disc::rings(plot, colour, colour);
     let text = RichText::new("light this way").color(colour).size(11.0);
     plot.text(
         Text::new("light", PlotPoint::new(92.0, -1.0), text).anchor(Align2::RIGHT_TOP).allow_hover(false),
     );
 }
 
-/// Where detectors stood, with the light turned to azimuth 0 and on one side of the plane of incidence, which no
-/// isotropic and bilateral material notices.
+/// Where detectors stood.
 fn draw_measured(plot: &mut PlotUi<'_>, document: &Document) {
     let Some(fitted) = document.fitted.as_ref().filter(|_| document.is_scattered()) else { return };
-    let measured = fitted.samples.angles.iter().take(MOST_DRAWN).map(|angles| {
+    let measured = fitted.samples.angles.iter().take(half_disc::MOST_DRAWN).map(|angles| {
         let (wi, wo) = angles.to_directions();
-        let theta = wo.z.clamp(-1.0, 1.0).acos().to_degrees();
-        // The angle between both azimuths, 0 to pi.
-        place(theta, (wo.y * wi.x - wo.x * wi.y).abs().atan2(wo.x * wi.x + wo.y * wi.y))
+        half_disc::place(half_disc::polar(&wo), half_disc::azimuth_between(&wi, &wo))
     });
     let points = Points::new("measured", measured.collect::<Vec<_>>()).radius(2.0);
     plot.points(points.color(document.colour).allow_hover(false));

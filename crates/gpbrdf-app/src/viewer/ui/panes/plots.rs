@@ -18,6 +18,7 @@ use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
 use crate::viewer::ui::pane::{
     Command, Offers, Order, Pane, PaneContext, Place, Share, Slot, Start, restored, saved,
 };
+use crate::viewer::ui::theme::LIGHT;
 use crate::viewer::ui::ticks::{axis, degree_marks, linear_marks, log_marks};
 use crate::viewer::ui::widgets::{Number, segments_ui, short, subscripted, tool_ui};
 use crate::viewer::work::curves::{
@@ -433,9 +434,6 @@ fn legend_ui(ui: &mut Ui, drawn: &[Drawn], look: &CurveLook, beside: bool) {
         });
     }
 }
-
-/// The colour of the direction of the light.
-const LIGHT: Color32 = Color32::from_rgb(0xD0, 0x9A, 0x10);
 
 /// How strong the line of a prediction is, over which the truth is dashed.
 const FAINT: f32 = 0.6;

@@ -1,20 +1,19 @@
 //! Measured directions on the hemisphere of the detector: values by colour, errors of those left out by size.
 
-use std::f64::consts::PI;
-
 use eframe::egui::{self, Align2, RichText, Ui};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints, PlotUi, Points, Text};
+use egui_plot::{PlotPoint, PlotUi, Points, Text};
 use gpbrdf_core::HalfDiff;
 use gpbrdf_core::figure::Colormap;
 
 use super::Look;
-use crate::viewer::state::document::{Document, Fitted};
-use crate::viewer::ui::navigate::{ViewKeys, focus_ui, navigate_plot};
+use crate::viewer::state::document::{Document, DocumentId, Fitted};
+use crate::viewer::state::look::Channel;
+use crate::viewer::ui::half_disc;
+use crate::viewer::ui::navigate::navigate_plot;
+use crate::viewer::ui::theme::LIGHT;
 use crate::viewer::ui::widgets::{narrow, scale_ui, short, subscripted};
 use crate::viewer::work::slices::colour;
 
-/// The most measurements that are drawn.
-const MOST: usize = 6000;
 /// Steps of colour and of size.
 const COLOURS: usize = 24;
 const SIZES: usize = 5;
@@ -41,9 +40,8 @@ struct Measured {
 /// Polar angles of light and detector and the angle between their azimuths, 0 to 180, in degrees.
 fn angles_of(angles: &HalfDiff) -> [f64; 3] {
     let (wi, wo) = angles.to_directions();
-    let polar = |z: f64| z.clamp(-1.0, 1.0).acos().to_degrees();
-    let azimuth = (wo.y * wi.x - wo.x * wi.y).abs().atan2(wo.x * wi.x + wo.y * wi.y);
-    [polar(wi.z), polar(wo.z), azimuth.to_degrees()]
+    let azimuth = half_disc::azimuth_between(&wi, &wo).to_degrees();
+    [half_disc::polar(&wi), half_disc::polar(&wo), azimuth]
 }
 
 /// The measurements near a direction of the light. Where the detector is there, light and detector change places,
@@ -66,16 +64,41 @@ fn measurements(fitted: &Fitted, look: &Look) -> Vec<Measured> {
             (false, true) => (second, first),
             (false, false) => return None,
         };
-        let (sine, cosine) = phi.to_radians().sin_cos();
-        let place = [theta_o * cosine, theta_o * sine];
+        let place = half_disc::place(theta_o, phi.to_radians());
         Some(Measured { place, theta_i, theta_o, phi, value: look.channel.of(*value), error: error(i) })
     });
-    found.take(MOST).collect()
+    found.take(half_disc::MOST_DRAWN).collect()
 }
 
-/// Draws the hemisphere; whether the view is to be reset.
-pub(super) fn ui(ui: &mut Ui, document: &Document, fitted: &Fitted, look: &Look, reset: bool) -> bool {
-    let measured = measurements(fitted, look);
+/// What the measurements that are shown depend on.
+type Key = (DocumentId, u64, f64, f64, Channel);
+
+/// The view with its latest measurements.
+#[derive(Default)]
+pub(super) struct HemisphereView {
+    key: Option<Key>,
+    measured: Vec<Measured>,
+}
+
+impl HemisphereView {
+    /// Draws the hemisphere; whether the view is to be reset.
+    pub(super) fn ui(
+        &mut self,
+        ui: &mut Ui,
+        document: &Document,
+        fitted: &Fitted,
+        look: &Look,
+        reset: bool,
+    ) -> bool {
+        let key = (document.id, fitted.version, look.incidence, look.within, look.channel);
+        if self.key != Some(key) {
+            (self.key, self.measured) = (Some(key), measurements(fitted, look));
+        }
+        measured_ui(ui, document, &self.measured, look, reset)
+    }
+}
+
+fn measured_ui(ui: &mut Ui, document: &Document, measured: &[Measured], look: &Look, reset: bool) -> bool {
     let logs: Vec<f64> = measured.iter().map(|m| m.value.max(1e-6).log10()).collect();
     let (low, high) =
         logs.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -98,24 +121,10 @@ pub(super) fn ui(ui: &mut Ui, document: &Document, fitted: &Fitted, look: &Look,
             ui.label("size: its error when it is left out");
         }
     });
-    let mut plot = Plot::new("measured directions")
-        .data_aspect(1.0)
-        .height(ui.available_height())
-        .include_x(-98.0)
-        .include_x(98.0)
-        .include_y(-8.0)
-        .include_y(98.0)
-        .show_axes(false)
-        .show_grid(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
-        .label_formatter(|_| None);
-    if reset {
-        plot = plot.reset();
-    }
+    let plot = half_disc::plot(ui, "measured directions", reset);
     let text = ui.visuals().text_color();
     let response = plot.show(ui, |plot| {
-        rings(plot, text, look.incidence);
+        frame(plot, text, look.incidence);
         let mut groups = vec![Vec::new(); COLOURS * SIZES];
         for (m, log) in measured.iter().zip(&logs) {
             let share = if high > low { (log - low) / (high - low) } else { 0.5 };
@@ -138,11 +147,8 @@ pub(super) fn ui(ui: &mut Ui, document: &Document, fitted: &Fitted, look: &Look,
             hover_ui(ui, m);
         }
     }
-    focus_ui(ui, &response.response);
     let name = format!("Measured directions of {}, {} shown", document.name, measured.len());
-    let info = || egui::WidgetInfo::labeled(egui::accesskit::Role::Figure, true, &name);
-    response.response.widget_info(info);
-    ViewKeys::of(ui.ctx(), &response.response).reset
+    half_disc::keys(ui, &response.response, &name)
 }
 
 /// One of `count` steps of a share.
@@ -174,21 +180,11 @@ fn hover_ui(ui: &Ui, m: &Measured) {
         });
 }
 
-/// Half circles of equal angle from the normal, and where the light is.
-fn rings(plot: &mut PlotUi<'_>, text: egui::Color32, incidence: f64) {
-    let faint = text.gamma_multiply(0.5);
-    for theta in [30.0, 60.0, 90.0] {
-        let circle: Vec<[f64; 2]> =
-            (0..=90).map(|i| PI * f64::from(i) / 90.0).map(|a| [theta * a.cos(), theta * a.sin()]).collect();
-        plot.line(Line::new("ring", PlotPoints::from(circle)).color(faint).width(1.0).allow_hover(false));
-        let label = RichText::new(format!("{theta:.0}°")).color(text).size(11.0);
-        let at = PlotPoint::new(0.0, theta + 1.0);
-        plot.text(Text::new("angle", at, label).anchor(Align2::CENTER_BOTTOM).allow_hover(false));
-    }
-    let base = PlotPoints::from(vec![[-90.0, 0.0], [90.0, 0.0]]);
-    plot.line(Line::new("plane of incidence", base).color(faint).width(1.0).allow_hover(false));
+/// What does not depend on the measurements, and where the light is.
+fn frame(plot: &mut PlotUi<'_>, text: egui::Color32, incidence: f64) {
+    half_disc::rings(plot, text.gamma_multiply(0.5), text);
     let light = Points::new("light", vec![[incidence, 0.0]]).shape(egui_plot::MarkerShape::Diamond);
-    plot.points(light.radius(6.0).color(egui::Color32::from_rgb(0xD0, 0x9A, 0x10)).allow_hover(false));
+    plot.points(light.radius(6.0).color(LIGHT).allow_hover(false));
     let label = RichText::new("light").color(text).size(11.0);
     let at = PlotPoint::new(incidence, -3.0);
     plot.text(Text::new("light", at, label).anchor(Align2::CENTER_TOP).allow_hover(false));

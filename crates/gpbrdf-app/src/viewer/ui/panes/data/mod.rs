@@ -6,6 +6,7 @@ mod lobe;
 use eframe::egui::{Rect, RichText, Ui, UiBuilder};
 use serde::{Deserialize, Serialize};
 
+use self::hemisphere::HemisphereView;
 use self::lobe::LobeView;
 use crate::viewer::state::look::Channel;
 use crate::viewer::ui::pane::{Pane, PaneContext, Place, restored, saved};
@@ -44,6 +45,7 @@ impl Default for Look {
 #[derive(Default)]
 pub(crate) struct Data {
     look: Look,
+    hemisphere: HemisphereView,
     lobe: LobeView,
 }
 
@@ -88,7 +90,8 @@ impl Pane for Data {
         let mut home = false;
         let look = self.look;
         let reset = cx.reset_views;
-        part(ui, left, "hemisphere", &mut |ui| home = hemisphere::ui(ui, document, fitted, &look, reset));
+        let hemisphere = &mut self.hemisphere;
+        part(ui, left, "hemisphere", &mut |ui| home = hemisphere.ui(ui, document, fitted, &look, reset));
         part(ui, right, "lobe", &mut |ui| self.lobe.ui(ui, document, fitted, &mut self.look));
         cx.reset_next |= home;
     }
