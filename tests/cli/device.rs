@@ -46,12 +46,12 @@ fn the_device_bakes_the_same_table() {
 }
 
 #[test]
-fn a_model_without_a_shader_is_baked_on_the_processor() {
+fn a_device_that_is_asked_for_refuses_a_model_without_a_shader() {
     if !has_device() {
         return;
     }
     let cli = Cli::new();
-    let run = cli.run(&[
+    let error = cli.fails(&[
         "bake",
         "red-plastic",
         "--samples",
@@ -69,9 +69,8 @@ fn a_model_without_a_shader_is_baked_on_the_processor() {
         "-o",
         "out",
     ]);
-    assert_eq!(run.code, Some(0), "{run:?}");
-    assert!(run.stderr.contains("no shader for the kernel matern; baking on the CPU"), "{run:?}");
-    assert!(run.stdout.contains("\"backend\": \"cpu\""), "{run:?}");
+    assert!(error.contains("no shader for the kernel matern; use --backend auto or cpu"), "{error}");
+    assert!(!cli.path("out").exists());
 }
 
 #[test]

@@ -29,6 +29,18 @@ fn slices_models_and_sessions_are_written_and_read_again() {
     for suffix in ["-truth.exr", "-prediction.exr", "-difference.exr", "-sigma.exr"] {
         assert!(exists(&png.with_file_name(format!("out{suffix}"))), "{suffix}");
     }
+    // A figure and a table are written as their names say.
+    let figure = std::fs::read(write(&mut driver, "Export slices…", "figure.pdf")).unwrap();
+    assert!(figure.starts_with(b"%PDF-"));
+    let truth = Source::built_in("ward").unwrap();
+    let at = HalfDiff { theta_h: 0.3, theta_d: 0.5, phi_d: 1.0 };
+    for name in ["table.binary", "table.exr", "table.bsdf"] {
+        let table = Source::open(write(&mut driver, "Export table…", name)).unwrap();
+        let (found, expected) =
+            (table.brdf().unwrap().eval_half_diff(at)[1], truth.brdf().unwrap().eval_half_diff(at)[1]);
+        assert!((found / expected - 1.0).abs() < 0.05, "{name} {found} {expected}");
+    }
+    write(&mut driver, "Export table…", "table.ktx2");
     let model = write(&mut driver, "Save model…", "out.safetensors");
     driver.press_with_ctrl(Key::S);
     let session = folder.path().join("out.json");
@@ -178,7 +190,9 @@ fn a_folder_that_is_missing_is_named() {
     driver.press_with_ctrl(Key::P);
     driver.wait("a message", |d| d.shows("/no/such/folder/gpbrdf-screenshot-1.png"));
     driver.click("Dismiss");
-    for (item, name) in [("Export slices…", "a.png"), ("Save model…", "b.safetensors")] {
+    for (item, name) in
+        [("Export slices…", "a.png"), ("Save model…", "b.safetensors"), ("Export table…", "c.dds")]
+    {
         driver.click("File");
         driver.click(item);
         driver.give_path(&PathBuf::from("/no/such/folder").join(name), "Write");

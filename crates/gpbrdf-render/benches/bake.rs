@@ -1,13 +1,14 @@
-//! Baking on the device until the texture is written: a lattice model of 64 x 32 x 18 nodes and a dense
-//! model, both RGB.
+//! What the processor prepares for the bake of a lattice model of 64 x 32 x 18 nodes, which needs no device; and
+//! baking on the device until the texture is written: this model and a dense one, both RGB.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
+use std::hint::black_box;
 use std::ops::ControlFlow;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use gpbrdf_core::gp::OptimizeOptions;
 use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Model, Solver, Source, fit};
-use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision};
+use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision, Prepared};
 
 fn model(layout: &Layout, solver: Solver) -> Option<Model> {
     let source = Source::built_in("cherry-235").ok()?;
@@ -19,6 +20,8 @@ fn model(layout: &Layout, solver: Solver) -> Option<Model> {
 }
 
 fn bake(c: &mut Criterion) {
+    let Some(lattice) = model(&Layout::Lattice(LatticeLayout::default()), Solver::Lattice) else { return };
+    c.bench_function("prepare_lattice_36864", |b| b.iter(|| Prepared::new(black_box(&lattice)).is_ok()));
     let context = match Context::open(AdapterChoice::Any) {
         Ok(context) => context,
         Err(error) => return eprintln!("skipped: {error}"),
@@ -26,9 +29,8 @@ fn bake(c: &mut Criterion) {
     eprintln!("on {}", context.describe());
     // A software device takes as long for 64 samples as a GPU for thousands.
     let dense_samples = if context.is_hardware() { 4096 } else { 64 };
-    let lattice = model(&Layout::Lattice(LatticeLayout::default()), Solver::Lattice);
     let dense = model(&Layout::Random { count: dense_samples, seed: 1 }, Solver::Dense);
-    let (Some(lattice), Some(dense), Ok(baker)) = (lattice, dense, Baker::new(&context)) else { return };
+    let (Some(dense), Ok(baker)) = (dense, Baker::new(&context)) else { return };
     let Ok(texture) = BrdfTexture::empty(&context, Precision::Half) else { return };
     let mut group = c.benchmark_group("bake");
     group.sample_size(10);

@@ -68,7 +68,7 @@ mod support;
 
 pub use {glam, wgpu};
 
-pub use bake::{Baker, Progress};
+pub use bake::{Baker, Prepared, Progress};
 pub use context::{AdapterChoice, Context};
 pub use error::{Error, Result};
 pub use lookup::{ShaderLanguage, evaluate, include, translate};

@@ -34,16 +34,19 @@ impl Backend {
     /// Bakes the mean of a model; sigma comes with it where a device makes both at once.
     ///
     /// # Errors
-    /// No device for [`Backend::Gpu`], or one that fails.
+    /// For [`Backend::Gpu`]: no device, or a model that its shaders cannot evaluate. A device that fails.
     pub(super) fn bake_mean(self, run: &mut Run, model: &Model) -> Result<Baked> {
         if let Some(context) = self.device(model, run)? {
             let observer = run.observer();
             let tables =
                 run.stage(Stage::BakeOnDevice, || match bake_on_device(&context, model, &*observer) {
                     Ok(tables) => Ok(Some(tables)),
-                    Err(error @ Error::NoShader { .. }) => {
+                    Err(error @ Error::NoShader { .. }) if self == Self::Auto => {
                         observer.warn(&format!("{error}; baking on the CPU"));
                         Ok(None)
+                    }
+                    Err(error @ Error::NoShader { .. }) => {
+                        Err(anyhow::anyhow!("{error}; use --backend auto or cpu"))
                     }
                     Err(error) if error.is_cancelled() => Err(gpbrdf_core::Error::Cancelled.into()),
                     Err(error) => Err(anyhow::Error::from(error)),

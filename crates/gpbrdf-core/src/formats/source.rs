@@ -60,9 +60,9 @@ pub struct Source {
     pub description: String,
     /// The kind of source, for people, for example `RGL measurement`.
     pub kind: String,
-    /// The file; `None` for built-in materials.
+    /// The file; `None` for built-in materials and for models that no file holds.
     pub path: Option<PathBuf>,
-    /// SHA-256 sum of the file, hexadecimal; empty for built-in materials.
+    /// SHA-256 sum of the file, hexadecimal; empty without one.
     pub sha256: String,
     /// What the source holds.
     pub content: Content,
@@ -171,6 +171,19 @@ impl Source {
         })
     }
 
+    /// A model that no file holds. It has the name of its material.
+    #[must_use]
+    pub fn of_model(model: Model) -> Self {
+        Self {
+            name: model.provenance.material.clone(),
+            description: format!("model of {}", model.provenance.source),
+            kind: "model".to_owned(),
+            path: None,
+            sha256: String::new(),
+            content: Content::Model(Box::new(model)),
+        }
+    }
+
     /// The source as a BRDF that can be evaluated at any directions.
     ///
     /// # Errors
@@ -251,12 +264,14 @@ impl Source {
         }
     }
 
-    /// The path of the file, or `built-in NAME`, for reports.
+    /// The path of the file, or `built-in NAME` or `model of NAME` without one, for reports.
     #[must_use]
     pub fn origin(&self) -> String {
-        self.path
-            .as_ref()
-            .map_or_else(|| format!("built-in {}", self.name), |path| path.display().to_string())
+        match (&self.path, &self.content) {
+            (Some(path), _) => path.display().to_string(),
+            (None, Content::Model(_)) => self.description.clone(),
+            (None, _) => format!("built-in {}", self.name),
+        }
     }
 }
 

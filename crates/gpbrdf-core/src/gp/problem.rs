@@ -44,6 +44,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) prior: Option<Arc<Prior>>,
     /// Functions that describe the targets together with the kernel.
     pub(crate) basis: Option<BasisTerm<'a>>,
+    /// Whether a process with a basis factorises its whole covariance in the search, however many samples there are.
+    pub(crate) factorises: bool,
     /// What is done about outliers.
     pub(crate) outliers: Outliers,
     /// Settings of the search.

@@ -4,6 +4,7 @@ mod axis;
 mod bessel;
 mod composite;
 mod grid;
+mod pairs;
 #[cfg(feature = "fit")]
 mod row_gradient;
 mod rows;
@@ -15,6 +16,7 @@ mod slopes;
 pub use axis::{Kernel1d, ParameterKind, Term1d};
 pub use composite::{AxisMetric, Kernel, KernelBody, KernelTerm};
 pub(crate) use grid::GridScratch;
+pub(crate) use pairs::Pairs;
 #[cfg(feature = "fit")]
 pub(crate) use row_gradient::GradientScratch;
 pub(crate) use rows::{Points, RowScratch};

@@ -9,7 +9,7 @@ use crate::base::simd::{dot, dot3, multiply, scale_into};
 /// Working arrays of one thread.
 #[derive(Debug)]
 pub(crate) struct GradientScratch {
-    row: RowScratch,
+    pub(super) row: RowScratch,
     slope: [f64; STRIP],
     weights: [f64; STRIP],
 }
@@ -38,10 +38,21 @@ impl Kernel {
             for (k, d2) in scratch.row.d2.iter_mut().enumerate() {
                 points.squared_distances(k, start..start + n, points, j, &mut d2[..n]);
             }
-            let mut first = 0;
-            for term in &self.terms {
-                first += scratch.add_term_gradient(term, weights, &mut gradient[first..]);
-            }
+            self.add_gradient_at_distances(weights, scratch, gradient);
+        }
+    }
+
+    /// Adds `sum_i weights[i] dk_i/dp` to `gradient[p]`, where `k_i` is the kernel at the squared distances along each
+    /// axis in `scratch`, at most those of a strip.
+    pub(super) fn add_gradient_at_distances(
+        &self,
+        weights: &[f64],
+        scratch: &mut GradientScratch,
+        gradient: &mut [f64],
+    ) {
+        let mut first = 0;
+        for term in &self.terms {
+            first += scratch.add_term_gradient(term, weights, &mut gradient[first..]);
         }
     }
 }

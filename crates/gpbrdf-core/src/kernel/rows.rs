@@ -184,22 +184,29 @@ impl Kernel {
             for (k, d2) in scratch.d2.iter_mut().enumerate() {
                 points.squared_distances(k, start..start + n, other, j, &mut d2[..n]);
             }
-            out.fill(0.0);
-            for term in &self.terms {
-                match &term.body {
-                    KernelBody::Ard { shape, length_scale } => {
-                        scratch.joint_distances(length_scale, n);
-                        shape.fill(&mut scratch.r2[..n]);
-                        add_scaled(term.variance, &scratch.r2[..n], out);
+            self.values_at_distances(scratch, out);
+        }
+    }
+
+    /// The kernel at the squared distances along each axis in `scratch`, of which there are as many as elements of
+    /// `out`, at most those of a strip.
+    pub(super) fn values_at_distances(&self, scratch: &mut RowScratch, out: &mut [f64]) {
+        let n = out.len();
+        out.fill(0.0);
+        for term in &self.terms {
+            match &term.body {
+                KernelBody::Ard { shape, length_scale } => {
+                    scratch.joint_distances(length_scale, n);
+                    shape.fill(&mut scratch.r2[..n]);
+                    add_scaled(term.variance, &scratch.r2[..n], out);
+                }
+                KernelBody::Product(axes) => {
+                    scratch.fill_factors(axes, n);
+                    scratch.value[..n].fill(term.variance);
+                    for factor in &scratch.factors {
+                        multiply(&factor[..n], &mut scratch.value[..n]);
                     }
-                    KernelBody::Product(axes) => {
-                        scratch.fill_factors(axes, n);
-                        scratch.value[..n].fill(term.variance);
-                        for factor in &scratch.factors {
-                            multiply(&factor[..n], &mut scratch.value[..n]);
-                        }
-                        add_scaled(1.0, &scratch.value[..n], out);
-                    }
+                    add_scaled(1.0, &scratch.value[..n], out);
                 }
             }
         }

@@ -110,7 +110,8 @@ impl FitOptions {
     /// The prior that a fit to these samples uses, if any: that of the options for targets that it describes, channels
     /// that share hyper-parameters with weak priors, and isotropic bilateral materials. With [`Solver::Auto`] it is
     /// used for at most 250 samples, and for at most 20,000 in the plane of incidence or with a prior of the user's
-    /// own; with [`Solver::Scattered`] for any number; with other solvers never.
+    /// own; with [`Solver::Scattered`] for any number; with [`Solver::Dense`] for any number off a lattice if it is
+    /// one of the user's own; with [`Solver::Lattice`] never.
     #[must_use]
     pub fn prior(&self, samples: &SampleSet) -> Option<Arc<Prior>> {
         let n = samples.len();
@@ -121,6 +122,7 @@ impl FitOptions {
         };
         let by_solver = match (self.solver, samples.lattice()) {
             (Solver::Scattered, _) => true,
+            (Solver::Dense, None) => matches!(self.prior, PriorChoice::Learned(_)),
             (Solver::Auto, None) => are_few,
             (Solver::Auto, Some(lattice)) => n <= FEW_SAMPLES && lattice.symmetry == Symmetry::Bilateral,
             _ => false,
@@ -160,6 +162,7 @@ impl FitOptions {
             usual_variance: self.transform.usual_variance(),
             prior,
             basis: None,
+            factorises: self.solver == Solver::Dense,
             outliers: self.outliers,
             optimize: &self.optimize,
             watch,

@@ -53,7 +53,7 @@ impl Pipelines {
         context: &Context,
         process: &KernelSum<'_>,
         first_channel: usize,
-        targets: &Targets,
+        targets: &Targets<'_>,
         progress: &mut Progress<'_>,
     ) -> Result<()> {
         let double = context.f64_arithmetic();
@@ -67,7 +67,7 @@ impl Pipelines {
         let chord = metric == AxisMetric::Chord;
         let source = shader::kernel_sum(&kernel.text, kernel.parameters.len(), double);
         let pipeline = self.get(context, &source)?;
-        let operands = Operands::new(context, process, &kernel, first_channel, &targets.geometry, chord)?;
+        let operands = Operands::new(context, process, &kernel, first_channel, targets.geometry(), chord)?;
         operands.run(context, &pipeline, targets, chord, progress)
     }
 
@@ -118,7 +118,7 @@ impl Operands {
         &self,
         context: &Context,
         pipeline: &wgpu::ComputePipeline,
-        targets: &Targets,
+        targets: &Targets<'_>,
         chord: bool,
         progress: &mut Progress<'_>,
     ) -> Result<()> {

@@ -5,13 +5,12 @@
 mod axis_table;
 pub(crate) mod kernel_source;
 pub(crate) mod kernel_sum;
+mod prepared;
 mod separable;
 mod targets;
 
 use std::ops::ControlFlow;
 
-use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart};
-use gpbrdf_core::sample::InputSpace;
 use gpbrdf_core::{Model, Transform};
 
 use crate::context::Context;
@@ -19,7 +18,8 @@ use crate::error::{Error, Result};
 use crate::gpu_types::{Finish, TransformKind, narrow, to_u32};
 use crate::shader;
 use crate::texture::{BrdfTexture, Precision};
-use separable::{Placement, Separable};
+use prepared::Part;
+pub use prepared::Prepared;
 use targets::Targets;
 
 /// Bakes models on a device. The constructor compiles shaders, so keep the baker.
@@ -44,42 +44,6 @@ pub struct Baker {
 /// A function that is called between dispatches with the share of the work that is done, in `[0, 1]`. It
 /// cancels the work by [`ControlFlow::Break`].
 pub type Progress<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
-
-/// A summand of the targets of a model.
-struct Part<'a> {
-    space: InputSpace,
-    form: Form<'a>,
-}
-
-/// What the shaders can evaluate, and how its channels contribute to those of the model.
-enum Form<'a> {
-    Separable(Box<Separable<'a>>, Placement),
-    KernelSum(KernelSum<'a>, usize),
-}
-
-/// The parts of a model, and what is added to each channel besides its offset.
-fn parts(model: &Model) -> Result<(Vec<Part<'_>>, [f64; 3])> {
-    let (mut parts, mut constants) = (Vec::new(), [0.0; 3]);
-    for (first, posterior) in model.posteriors() {
-        match posterior.device_form() {
-            DeviceForm::Separable(summands) => {
-                for SeparablePart { gp, space, colour } in summands {
-                    let placement =
-                        colour.map_or(Placement::Channels { first }, |colour| Placement::Mixed { colour });
-                    let form = Form::Separable(Box::new(Separable::new(gp)?), placement);
-                    parts.push(Part { space: space.into(), form });
-                }
-            }
-            DeviceForm::KernelSum(all) => {
-                let sums = all.sums.into_iter();
-                parts.extend(sums.map(|sum| Part { space: sum.space, form: Form::KernelSum(sum, first) }));
-                constants.iter_mut().zip(all.constants).for_each(|(sum, constant)| *sum += constant);
-            }
-            _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
-        }
-    }
-    Ok((parts, constants))
-}
 
 impl Baker {
     /// Compiles the shaders.
@@ -119,45 +83,49 @@ impl Baker {
     /// # Errors
     /// Those of [`Baker::bake`].
     pub fn bake_into(&self, model: &Model, texture: &BrdfTexture, progress: &mut Progress<'_>) -> Result<()> {
+        self.bake_prepared(&Prepared::new(model)?, texture, progress)
+    }
+
+    /// [`Baker::bake_into`] of a model that was prepared before.
+    ///
+    /// # Errors
+    /// Those of [`Baker::bake`].
+    pub fn bake_prepared(
+        &self,
+        prepared: &Prepared<'_>,
+        texture: &BrdfTexture,
+        progress: &mut Progress<'_>,
+    ) -> Result<()> {
         // On OpenGL the layers would stay black, without an error.
         if self.context.info().backend == wgpu::Backend::Gl {
             return Err(Error::NoShader { what: "3-D textures written on OpenGL".to_owned() });
         }
-        let context = &self.context;
-        let (parts, constants) = parts(model)?;
-        let targets = Targets::new(context, model.space(), &parts)?;
-        let mut mixed = false;
+        let (context, parts) = (&self.context, &prepared.parts);
+        let targets = Targets::new(context, prepared)?;
         for (i, part) in parts.iter().enumerate() {
             let share = |done: f64| (i as f64 + done) / parts.len() as f64;
-            match &part.form {
-                Form::Separable(process, placement) => {
+            match part {
+                Part::Separable(process) => {
                     report(progress, share(0.0))?;
-                    let geometry = targets.geometry_of(part.space);
-                    self.separable.add(context, process, &geometry, &targets, *placement)?;
-                    mixed |= matches!(placement, Placement::Mixed { .. });
+                    self.separable.add(context, process, &targets)?;
                 }
-                Form::KernelSum(process, first_channel) => {
+                Part::KernelSum(process, first_channel) => {
                     let mut within = |done: f64| progress(share(done));
                     self.kernel_sum.add(context, process, *first_channel, &targets, &mut within)?;
                 }
             }
         }
-        if mixed {
+        if prepared.is_mixed() {
             self.separable.finish_sigma(context, &targets)?;
         }
-        self.finish(model, constants, &targets, texture)?;
+        self.finish(prepared, &targets, texture)?;
         report(progress, 1.0)
     }
 
     /// Transforms targets back to sr^-1 and writes the texels.
-    fn finish(
-        &self,
-        model: &Model,
-        constants: [f64; 3],
-        targets: &Targets,
-        texture: &BrdfTexture,
-    ) -> Result<()> {
+    fn finish(&self, prepared: &Prepared<'_>, targets: &Targets<'_>, texture: &BrdfTexture) -> Result<()> {
         const WHAT: &str = "bake: texels";
+        let Prepared { model, constants, .. } = prepared;
         let (transform, epsilon) = match model.transform {
             Transform::Identity => (TransformKind::Identity, 0.0),
             Transform::Log { epsilon } => (TransformKind::Log, epsilon),
@@ -172,7 +140,7 @@ impl Baker {
             rows: to_u32(targets.rows()),
             largest: if texture.precision() == Precision::Half { 65_504.0 } else { f32::MAX },
         };
-        let distinct: Vec<u32> = targets.distinct.iter().map(|&n| to_u32(n)).collect();
+        let distinct: Vec<u32> = prepared.distinct.iter().map(|&n| to_u32(n)).collect();
         let context = &self.context;
         let uniform = context.uniform(&uniform)?;
         let storage = wgpu::BufferUsages::STORAGE;

@@ -13,22 +13,16 @@ use crate::shader;
 
 const WHAT: &str = "bake: separable form";
 
-/// A process in its separable form.
-pub(super) struct Separable<'a> {
-    form: SeparableForm<'a>,
-    /// The nodes along `theta_d`, where the functions of that axis may have kinks.
-    nodes: &'a [f64],
-    signal_variance: f64,
-}
-
-impl<'a> Separable<'a> {
-    pub(super) fn new(gp: &'a LatticeGp) -> Result<Self> {
-        Ok(Self {
-            form: SeparableForm::new(gp)?,
-            nodes: &gp.data().coordinates[1],
-            signal_variance: gp.hyper().signal_variance,
-        })
-    }
+/// A process in its separable form as the shader reads it.
+#[derive(Debug)]
+pub(super) struct Separable {
+    uniform: gpu_types::Separable,
+    tables: Vec<f32>,
+    cubics: Vec<[f32; 4]>,
+    coefficients: Vec<[f32; 4]>,
+    /// Functions along each axis.
+    shape: [usize; 3],
+    pub(super) placement: Placement,
 }
 
 /// How the channels of a process contribute to those of the model.
@@ -75,22 +69,15 @@ impl Pipelines {
     ///
     /// With the default lattice of 64 x 32 x 18 nodes the three steps take 18 M, 15 M and 23 M multiply-adds
     /// of four components.
-    pub(super) fn add(
-        &self,
-        context: &Context,
-        process: &Separable<'_>,
-        geometry: &TableGeometry,
-        targets: &Targets,
-        placement: Placement,
-    ) -> Result<()> {
-        let operands = Operands::new(context, process, geometry, placement)?;
-        let [_, b, c] = process.form.shape();
-        let rows = geometry.third().len();
+    pub(super) fn add(&self, context: &Context, process: &Separable, targets: &Targets<'_>) -> Result<()> {
+        let operands = Operands::new(context, process)?;
+        let [_, b, c] = process.shape;
+        let rows = targets.rows();
         let vectors =
             |label, count: usize| context.empty_buffer(label, 16 * count as u64, BufferUsages::STORAGE);
         let along_first = vectors("bake: theta_h", N_THETA_H * b * c)?;
         let along_both = vectors("bake: theta_h and phi_d", N_THETA_H * rows * b)?;
-        let evaluate = match placement {
+        let evaluate = match process.placement {
             Placement::Channels { .. } => &self.evaluate_second,
             Placement::Mixed { .. } => &self.evaluate_component,
         };
@@ -116,7 +103,7 @@ impl Pipelines {
     }
 
     /// Turns the variances that parts of [`Placement::Mixed`] have added up into sigma.
-    pub(super) fn finish_sigma(&self, context: &Context, targets: &Targets) -> Result<()> {
+    pub(super) fn finish_sigma(&self, context: &Context, targets: &Targets<'_>) -> Result<()> {
         let shape = [0, 0, 0, to_u32(targets.rows())];
         let uniform = context.uniform(&gpu_types::Separable { shape, ..Default::default() })?;
         context.guard(WHAT, || {
@@ -136,14 +123,23 @@ struct Operands {
 }
 
 impl Operands {
-    fn new(
-        context: &Context,
-        process: &Separable<'_>,
-        geometry: &TableGeometry,
-        placement: Placement,
-    ) -> Result<Self> {
-        let form = &process.form;
-        let axis = AxisTable::new(form, process.nodes);
+    fn new(context: &Context, process: &Separable) -> Result<Self> {
+        let buffer = |label, bytes| context.buffer_of(label, bytes, BufferUsages::STORAGE);
+        Ok(Self {
+            uniform: context.uniform(&process.uniform)?,
+            tables: buffer("bake: tables", bytemuck::cast_slice(&process.tables))?,
+            cubics: buffer("bake: cubics", bytemuck::cast_slice(&process.cubics))?,
+            coefficients: buffer("bake: coefficients", bytemuck::cast_slice(&process.coefficients))?,
+        })
+    }
+}
+
+impl Separable {
+    /// Tabulates the functions of every axis, those of `theta_h` and `phi_d` at the cells of `geometry`, those of
+    /// `theta_d` as piecewise cubics.
+    pub(super) fn new(gp: &LatticeGp, geometry: &TableGeometry, placement: Placement) -> Result<Self> {
+        let form = &SeparableForm::new(gp)?;
+        let axis = AxisTable::new(form, &gp.data().coordinates[1]);
         let mut tables = Tables::default();
         let first = tables.push_basis(form, 0, geometry.first());
         let third = tables.push_basis(form, 2, geometry.third());
@@ -160,7 +156,7 @@ impl Operands {
             third,
             second,
             pieces: [to_u32(axis.breaks.len() - 1), to_u32(axis.pieces)],
-            signal_variance: narrow(process.signal_variance),
+            signal_variance: narrow(gp.hyper().signal_variance),
             second_prior: narrow(axis.prior),
             limit: narrow(geometry.limit().min(f64::from(f32::MAX))),
             padding: [0.0; 3],
@@ -170,13 +166,7 @@ impl Operands {
             },
         };
         let coefficients = coefficients(form, placement);
-        let buffer = |label, bytes| context.buffer_of(label, bytes, BufferUsages::STORAGE);
-        Ok(Self {
-            uniform: context.uniform(&uniform)?,
-            tables: buffer("bake: tables", bytemuck::cast_slice(&tables.0))?,
-            cubics: buffer("bake: cubics", bytemuck::cast_slice(&axis.cubics))?,
-            coefficients: buffer("bake: coefficients", bytemuck::cast_slice(&coefficients))?,
-        })
+        Ok(Self { uniform, tables: tables.0, cubics: axis.cubics, coefficients, shape: [a, b, c], placement })
     }
 }
 

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use eframe::egui::{ColorImage, Context, Rect};
-use gpbrdf_core::Rgb;
 use gpbrdf_core::base::AtomicFile;
-use gpbrdf_core::figure::{Figure, FigureOptions, Panel, Picture, Scale, Slice, slice_figure};
-use gpbrdf_core::formats::write_image_exr;
+use gpbrdf_core::figure::{Figure, FigureFormat, FigureOptions, Panel, Picture, Scale, Slice, slice_figure};
+use gpbrdf_core::formats::{OutputFormat, OutputOptions, write_image_exr};
+use gpbrdf_core::{Model, Rgb, Source};
 use gpbrdf_render::LinearPixel;
 
 use super::outbox::{Outbox, in_background};
@@ -38,6 +38,21 @@ fn png_file(path: &Path, picture: &Picture) -> Result<AtomicFile> {
     Ok(file)
 }
 
+/// A figure in the format that its name says, as PNG where it says none.
+fn figure_file(path: &Path, figure: &Figure) -> Result<AtomicFile> {
+    let mut file = AtomicFile::create(path)?;
+    let format = FigureFormat::of(path).unwrap_or(FigureFormat::Png);
+    figure
+        .write(&mut file, format, &FigureOptions::default())
+        .with_context(|| format!("cannot write \"{}\"", path.display()))?;
+    Ok(file)
+}
+
+/// The path with `.png` in place of its ending unless that is one of figures.
+fn figure_path(path: &Path) -> PathBuf {
+    if FigureFormat::of(path).is_some() { path.to_owned() } else { path.with_extension("png") }
+}
+
 fn exr_file(path: &Path, size: [usize; 2], pixels: &[Rgb]) -> Result<AtomicFile> {
     let mut file = AtomicFile::create(path)?;
     write_image_exr(&mut file, size[0], size[1], pixels)
@@ -52,13 +67,12 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
         return;
     };
     let truth = Truth::of(document);
-    let (name, path) = (document.name.clone(), path.with_extension("png"));
+    let (name, path) = (document.name.clone(), figure_path(path));
     let options = look.options();
     write(outbox, move || {
         let truth = truth.as_ref().and_then(Truth::brdf);
-        let picture =
-            slice_figure(&name, truth, fitted.mean.as_ref(), &options)?.picture(&FigureOptions::default())?;
-        let mut files = vec![png_file(&path, &picture)?];
+        let figure = slice_figure(&name, truth, fitted.mean.as_ref(), &options)?;
+        let mut files = vec![figure_file(&path, &figure)?];
         let size = [options.size; 2];
         let mut add = |suffix: &str, pixels: &[Rgb]| -> Result<()> {
             files.push(exr_file(&beside(&path, suffix), size, pixels)?);
@@ -82,7 +96,7 @@ pub(crate) fn slices(document: &Document, look: &SliceLook, path: &Path, outbox:
 
 /// Writes the lit object as it is shown: a figure, and linear pictures beside it.
 pub(crate) fn picture(name: &str, whole: &Whole, path: &Path, outbox: &Outbox<Saved>) {
-    let (name, whole, path) = (name.to_owned(), whole.clone(), path.with_extension("png"));
+    let (name, whole, path) = (name.to_owned(), whole.clone(), figure_path(path));
     write(outbox, move || {
         let mut panels = Vec::new();
         if let Some(truth) = &whole.truth {
@@ -95,8 +109,7 @@ pub(crate) fn picture(name: &str, whole: &Whole, path: &Path, outbox: &Outbox<Sa
             panels.push(Panel::scaled("difference", picture_of(difference), scale));
             note = "difference: exposure x (prediction - truth), linear, mean of R, G, B";
         }
-        let picture = Figure::of_panels(name, panels, note).picture(&FigureOptions::default())?;
-        let mut files = vec![png_file(&path, &picture)?];
+        let mut files = vec![figure_file(&path, &Figure::of_panels(name, panels, note))?];
         let raster = whole.linear.raster();
         let mut linear = |which: &str, value: fn(&LinearPixel) -> [f32; 3]| -> Result<()> {
             let pixels: Vec<Rgb> = raster.pixels().iter().map(|p| value(p).map(f64::from)).collect();
@@ -180,6 +193,20 @@ pub(crate) fn model(document: &Document, path: &Path, outbox: &Outbox<Saved>) {
             .with_context(|| format!("cannot write \"{}\"", path.display()))?;
         file.commit()?;
         Ok(format!("saved model \"{}\"", path.display()))
+    });
+}
+
+/// Writes the prediction of a material in any format that its name says, as `gpbrdf-cli convert` does.
+pub(crate) fn table(document: &Document, path: &Path, outbox: &Outbox<Saved>) {
+    let Some(model) = document.fitted.as_ref().map(|fitted| Arc::clone(&fitted.model)) else {
+        outbox.send(Err("nothing to export: no model has been fitted yet".to_owned()));
+        return;
+    };
+    let (path, name) = (path.to_owned(), document.name.clone());
+    write(outbox, move || {
+        let source = Source { name, ..Source::of_model(Model::clone(&model)) };
+        source.write(&path, OutputFormat::of(&path)?, &OutputOptions::default())?;
+        Ok(format!("wrote \"{}\"", path.display()))
     });
 }
 

@@ -7,12 +7,12 @@ use crate::base::error::{Error, Result};
 use crate::base::linalg::{factorize, solve_lower};
 use crate::base::simd::dot;
 use crate::brdf::angles::HalfDiff;
-use crate::gp::LeaveOneOut;
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
+use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
 
 /// Deviation of the brightness by which a material may differ from one of the library that it is like.
@@ -20,6 +20,9 @@ const BRIGHTNESS: f64 = 0.5;
 
 /// The least effective number of materials that shape an adapted prior.
 const FEWEST_MATERIALS: f64 = 20.0;
+
+/// Evaluations of the likelihood that the searches of both kinds of colour usually take.
+const EVALUATIONS: usize = 110;
 
 /// The largest number of samples with which materials are compared.
 const MOST_COMPARED: usize = 512;
@@ -30,6 +33,12 @@ const MOST_COMPARED: usize = 512;
 /// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
 /// that the samples resemble.
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
+    if problem.factorises {
+        problem.refuse_known_noise()?;
+        // The factor and the inverse.
+        let cost = dense_cost(problem.angles.len(), 3, EVALUATIONS);
+        FitCost { bytes: 2.0 * cost.bytes, ..cost }.check()?;
+    }
     // Three fits of about the same length.
     let fit_colour = |nth: f64, prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);

@@ -1,6 +1,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::brdf::{Brdf, HalfDiff, material, materials};
+use crate::gp::Solver;
 use crate::model::{FitOptions, IntervalOf, Model, PriorChoice, condition, fit};
 use crate::prior::{Colour, LearnOptions, Library, Prior, learn, to_opponent, variance_of_channels};
 use crate::sample::{Layout, SampleSet};
@@ -143,4 +144,18 @@ fn a_pair_turned_about_the_normal_has_the_same_value() {
             assert!((value[0] / values[0][0] - 1.0).abs() < 1e-9, "{values:?}");
         }
     }
+}
+
+/// Few samples have their whole covariance factorised by either solver; the dense one takes a prior only if it is asked
+/// to.
+#[test]
+fn the_dense_solver_uses_a_prior_of_the_user_s_own() {
+    let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 30));
+    let fitted = fit(&samples, &options(&prior)).unwrap();
+    let dense = fit(&samples, &FitOptions { solver: Solver::Dense, ..options(&prior) }).unwrap();
+    let test = test_angles();
+    assert_eq!(dense.model.predict_target(&test), fitted.model.predict_target(&test));
+    assert_eq!(dense.model.hyper_report()["prior"], "test");
+    let unasked = FitOptions { solver: Solver::Dense, ..FitOptions::default() };
+    assert!(unasked.prior(&samples).is_none());
 }

@@ -1,8 +1,8 @@
 //! The distribution of one sample given a few others: the building block of the nearest-neighbour likelihood,
 //! of the preconditioner, of variances and of leave-one-out predictions.
 
-use crate::base::simd::{add_scaled, dot};
-use crate::kernel::Kernel;
+use crate::base::simd::{add_scaled, dot, vectorized};
+use crate::kernel::{Kernel, Pairs};
 
 /// Functions `b` that add `v b(x)^T b(x')` to a covariance, by their values at the samples. There may be none.
 #[derive(Clone, Debug, Default)]
@@ -96,100 +96,144 @@ impl Process<'_> {
     }
 }
 
-/// Work arrays of one thread for conditionals on up to `count` samples.
+/// Work arrays of one thread for conditionals on a few samples.
 #[derive(Debug)]
 pub(super) struct Scratch {
-    count: usize,
-    /// Lower triangle of the covariance of the samples, then its Cholesky factor, in rows of `count`.
+    pairs: Pairs,
+    /// Covariances of all pairs of the samples and, last, the point, packed like those of [`Pairs`].
+    covariances: Vec<f64>,
+    /// Upper triangle of the covariance of the samples, then its Cholesky factor, rows of the number of samples.
     factor: Vec<f64>,
+    /// Variances of the samples.
+    diagonal: Vec<f64>,
     /// Covariances with the point, then the coefficients of the samples in its conditional mean.
     coefficients: Vec<f64>,
 }
 
 impl Scratch {
-    pub(super) fn new(count: usize) -> Self {
-        Self { count, factor: vec![0.0; count * count], coefficients: vec![0.0; count] }
+    pub(super) fn new(kernel: &Kernel) -> Self {
+        Self {
+            pairs: Pairs::new(kernel.dimension()),
+            covariances: Vec::new(),
+            factor: Vec::new(),
+            diagonal: Vec::new(),
+            coefficients: Vec::new(),
+        }
     }
 
     /// Conditions sample `i` on the samples `given`: the coefficients of these in its mean, and the variance of its
     /// noise-free value. Cost: `m^3 / 6` multiply-adds and `m^2 / 2` kernel evaluations.
     #[cfg(feature = "fit")]
     pub(super) fn condition(&mut self, process: &Process<'_>, i: usize, given: &[u32]) -> (&[f64], f64) {
-        let at = |a: usize| given[a] as usize;
-        let (coefficients, explained) = self.explain(
-            given.len(),
-            |a, b| process.covariance(at(a), at(b)),
-            |a| process.diagonal(at(a)),
-            |a| process.covariance(at(a), i),
-        );
+        self.covary(process, given, process.point(i));
+        self.add_basis(process, given, i);
         let row = process.basis.row(i);
         let prior = process.kernel.prior_variance() + process.in_basis(row, row);
+        let (coefficients, explained) = self.explain(given.len(), |a| process.diagonal(given[a] as usize));
         (coefficients, (prior - explained).max(0.0))
     }
 
-    /// The coefficients of `m` samples in the mean of a point, and the variance that they explain, from the
-    /// covariances of pairs of samples, the variances of their measurements and the covariances with the point.
-    pub(super) fn explain(
-        &mut self,
-        m: usize,
-        mut covariance: impl FnMut(usize, usize) -> f64,
-        mut diagonal: impl FnMut(usize) -> f64,
-        mut with_point: impl FnMut(usize) -> f64,
-    ) -> (&[f64], f64) {
-        for a in 0..m {
-            for b in 0..a {
-                self.factor[a * self.count + b] = covariance(a, b);
+    /// Takes the kernel of all pairs of the samples `given` and, last, a point, and returns it, packed.
+    pub(super) fn covary(&mut self, process: &Process<'_>, given: &[u32], point: &[f64]) -> &mut [f64] {
+        let points = given.iter().map(|&j| process.point(j as usize));
+        self.pairs.take(points.chain([point]), &process.kernel.metric);
+        self.pairs.values(process.kernel, &mut self.covariances);
+        &mut self.covariances
+    }
+
+    /// Adds what the basis contributes to the covariances of the samples `given` and, last, sample `i`.
+    #[cfg(feature = "fit")]
+    pub(super) fn add_basis(&mut self, process: &Process<'_>, given: &[u32], i: usize) {
+        if process.basis.count > 0 {
+            let rows = || given.iter().map(|&j| process.basis.row(j as usize)).chain([process.basis.row(i)]);
+            let of_pairs =
+                rows().enumerate().flat_map(|(a, row)| rows().skip(a + 1).map(move |other| (row, other)));
+            for (value, (a, b)) in self.covariances.iter_mut().zip(of_pairs) {
+                *value += process.in_basis(a, b);
             }
-            self.factor[a * self.count + a] = diagonal(a);
-            self.coefficients[a] = with_point(a);
         }
-        factorize(&mut self.factor, self.count, m);
-        let coefficients = &mut self.coefficients[..m];
-        forward(&self.factor, self.count, coefficients);
-        let explained = coefficients.iter().map(|x| x * x).sum();
-        backward(&self.factor, self.count, coefficients);
-        (coefficients, explained)
+    }
+
+    /// Adds the derivatives of the kernel between the pairs of the last call of [`Scratch::covary`], times weights.
+    #[cfg(feature = "fit")]
+    pub(super) fn add_gradient(&mut self, kernel: &Kernel, weights: &[f64], gradient: &mut [f64]) {
+        self.pairs.add_gradient(kernel, weights, gradient);
+    }
+
+    /// The coefficients of `m` samples in the mean of a point, and the variance that they explain, from the covariances
+    /// of the last call of [`Scratch::covary`], changed since or not, and the variances of the measurements.
+    pub(super) fn explain(&mut self, m: usize, diagonal: impl Fn(usize) -> f64) -> (&[f64], f64) {
+        self.factor.resize(m * m, 0.0);
+        self.diagonal.clear();
+        self.diagonal.extend((0..m).map(diagonal));
+        self.coefficients.clear();
+        let mut rest = &self.covariances[..];
+        for a in 0..m {
+            let (row, others) = rest.split_at(m - a);
+            rest = others;
+            let (last, row) = row.split_last().map_or((0.0, row), |(last, row)| (*last, row));
+            self.factor[a * m + a] = self.diagonal[a];
+            self.factor[a * m + a + 1..(a + 1) * m].copy_from_slice(row);
+            self.coefficients.push(last);
+        }
+        factorize(&mut self.factor, &self.diagonal);
+        forward(&self.factor, &mut self.coefficients);
+        let explained = self.coefficients.iter().map(|x| x * x).sum();
+        backward(&self.factor, &mut self.coefficients);
+        (&self.coefficients, explained)
     }
 
     /// Solves `K w = y` in place with the covariance of the last call of [`Scratch::explain`].
     #[cfg(feature = "fit")]
     pub(super) fn solve(&self, y: &mut [f64]) {
-        forward(&self.factor, self.count, y);
-        backward(&self.factor, self.count, y);
+        forward(&self.factor, y);
+        backward(&self.factor, y);
     }
 }
 
-/// The Cholesky factor of the leading `m x m` block of a matrix in rows of `stride`, in place; only the lower
-/// triangle is used. A pivot that rounding has made negative becomes a small positive one.
-fn factorize(matrix: &mut [f64], stride: usize, m: usize) {
+/// The Cholesky factor `U` of a matrix `U^T U` of which the upper triangle is given, in place, rows of the length of
+/// `diagonal`, which holds the diagonal of the matrix. A pivot that rounding has made negative becomes a small positive
+/// one.
+fn factorize(matrix: &mut [f64], diagonal: &[f64]) {
+    let m = diagonal.len();
+    vectorized(
+        #[inline(always)]
+        || {
+            for k in 0..m {
+                let (above, below) = matrix.split_at_mut((k + 1) * m);
+                let row = &mut above[k * m + k..];
+                let pivot = row[0].max(1e-14 * diagonal[k]).sqrt();
+                row[0] = pivot;
+                let inverse = pivot.recip();
+                row[1..].iter_mut().for_each(|x| *x *= inverse);
+                for (i, other) in below.chunks_exact_mut(m).enumerate() {
+                    let factor = row[i + 1];
+                    for (x, y) in other[k + 1 + i..].iter_mut().zip(&row[i + 1..]) {
+                        *x -= factor * y;
+                    }
+                }
+            }
+        },
+    );
+}
+
+/// Solves `U^T x = y` in place for the factor of [`factorize`].
+fn forward(factor: &[f64], y: &mut [f64]) {
+    let m = y.len();
     for a in 0..m {
-        let (above, row) = matrix.split_at_mut(a * stride);
-        let diagonal = row[a];
-        for b in 0..a {
-            let other = &above[b * stride..b * stride + b + 1];
-            let known: f64 = row[..b].iter().zip(other).map(|(x, y)| x * y).sum();
-            row[b] = (row[b] - known) / other[b];
-        }
-        let known: f64 = row[..a].iter().map(|x| x * x).sum();
-        row[a] = (diagonal - known).max(1e-14 * diagonal).sqrt();
+        let row = &factor[a * m + a..(a + 1) * m];
+        let (first, rest) = y[a..].split_at_mut(1);
+        first[0] /= row[0];
+        rest.iter_mut().zip(&row[1..]).for_each(|(y, u)| *y -= u * first[0]);
     }
 }
 
-/// Solves `L x = y` in place for the factor of [`factorize`].
-fn forward(factor: &[f64], stride: usize, y: &mut [f64]) {
-    for a in 0..y.len() {
-        let row = &factor[a * stride..=a * stride + a];
-        let known: f64 = row[..a].iter().zip(&*y).map(|(l, y)| l * y).sum();
-        y[a] = (y[a] - known) / row[a];
-    }
-}
-
-/// Solves `L^T x = y` in place.
-fn backward(factor: &[f64], stride: usize, y: &mut [f64]) {
-    for a in (0..y.len()).rev() {
-        let row = &factor[a * stride..=a * stride + a];
-        y[a] /= row[a];
-        let value = y[a];
-        y[..a].iter_mut().zip(row).for_each(|(y, l)| *y -= l * value);
+/// Solves `U x = y` in place.
+fn backward(factor: &[f64], y: &mut [f64]) {
+    let m = y.len();
+    for a in (0..m).rev() {
+        let row = &factor[a * m + a..(a + 1) * m];
+        let known: f64 = row[1..].iter().zip(&y[a + 1..]).map(|(u, y)| u * y).sum();
+        y[a] = (y[a] - known) / row[0];
     }
 }

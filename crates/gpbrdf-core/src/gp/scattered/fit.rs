@@ -217,7 +217,7 @@ fn maximise(
 ) -> Result<Optimum> {
     let n = data.len();
     // With a basis all samples are correlated, so few samples are not left to their neighbours.
-    let is_exact = n <= exact::MOST_SAMPLES && data.basis.count > 0;
+    let is_exact = data.basis.count > 0 && (n <= exact::MOST_SAMPLES || problem.factorises);
     let neighbours = if is_exact {
         Neighbours::default()
     } else {
@@ -279,7 +279,7 @@ impl State {
         let rows: Vec<(Vec<f64>, f64)> = (0..data.len())
             .into_par_iter()
             .map_init(
-                || Scratch::new(NEAREST),
+                || Scratch::new(&self.kernel),
                 |scratch, i| {
                     if i % STEP == STEP - 1 {
                         steps.take()?;

@@ -223,7 +223,7 @@ impl ScatteredGp {
             .par_chunks(self.kernel.dimension())
             .enumerate()
             .map_init(
-                || Scratch::new(NEAREST),
+                || Scratch::new(&self.kernel),
                 |scratch, (j, point)| {
                     let own = &basis[j * self.basis.count..(j + 1) * self.basis.count];
                     let variance = far_field.variance(&process, (point, own), nearest.of(j), scratch);

@@ -202,11 +202,6 @@ impl Neighbours {
     pub(super) fn len(&self) -> usize {
         self.sets.len()
     }
-
-    /// The largest number of neighbours of a point, at least 1.
-    pub(super) fn largest(&self) -> usize {
-        self.sets.iter().map(Vec::len).max().unwrap_or(0).max(1)
-    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "fewer samples than 2^32 fit in memory")]

@@ -100,9 +100,21 @@ impl LowRank {
         &self.row(i)[self.basis..]
     }
 
-    /// The covariance of two samples that `B B^T` leaves.
-    fn rest(&self, process: &Process<'_>, i: usize, j: usize) -> f64 {
-        process.kernel.value(process.point(i), process.point(j)) - dot(self.inducing(i), self.inducing(j))
+    /// Takes the part of the inducing points from the covariances of all pairs of samples and, last, a point with this
+    /// part of a row, packed like those of [`Pairs`](crate::kernel::Pairs).
+    fn take_from(&self, covariances: &mut [f64], samples: &[u32], point: &[f64]) {
+        if self.points == 0 {
+            return;
+        }
+        let row = |a: usize| samples.get(a).map_or(point, |&j| self.inducing(j as usize));
+        let mut rest = covariances;
+        for a in 0..samples.len() {
+            let (others, next) = rest.split_at_mut(samples.len() - a);
+            for (covariance, b) in others.iter_mut().zip(a + 1..) {
+                *covariance -= dot(row(a), row(b));
+            }
+            rest = next;
+        }
     }
 
     /// The variance of a measurement of a sample that `B B^T` leaves.
@@ -134,16 +146,12 @@ impl FarField {
         let low_rank = &self.low_rank;
         let mut known = low_rank.at(process, point, basis);
         let own = &known[low_rank.basis..];
-        let at = |a: usize| nearest[a] as usize;
-        let (b, explained) = scratch.explain(
-            nearest.len(),
-            |a, b| low_rank.rest(process, at(a), at(b)),
-            |a| low_rank.rest_variance(process, at(a)),
-            |a| process.kernel.value(process.point(at(a)), point) - dot(low_rank.inducing(at(a)), own),
-        );
+        low_rank.take_from(scratch.covary(process, nearest, point), nearest, own);
+        let (b, explained) =
+            scratch.explain(nearest.len(), |a| low_rank.rest_variance(process, nearest[a] as usize));
         let rest = process.kernel.prior_variance() - dot(own, own) - explained;
-        for (a, b) in b.iter().enumerate() {
-            add_scaled(-b, low_rank.row(at(a)), &mut known);
+        for (b, &j) in b.iter().zip(nearest) {
+            add_scaled(-b, low_rank.row(j as usize), &mut known);
         }
         if low_rank.rank() > 0 {
             solve_lower(&self.capacitance, low_rank.rank(), &mut known);
@@ -181,19 +189,16 @@ impl Preconditioner {
         let conditionals: Vec<(Vec<f64>, f64)> = (0..neighbours.len())
             .into_par_iter()
             .map_init(
-                || Scratch::new(neighbours.largest()),
+                || Scratch::new(process.kernel),
                 |scratch, i| {
                     if i % STEP == STEP - 1 {
                         steps.take()?;
                     }
                     let given = neighbours.of(i);
-                    let at = |a: usize| given[a] as usize;
-                    let (b, explained) = scratch.explain(
-                        given.len(),
-                        |a, b| low_rank.rest(process, at(a), at(b)),
-                        |a| low_rank.rest_variance(process, at(a)),
-                        |a| low_rank.rest(process, i, at(a)),
-                    );
+                    let covariances = scratch.covary(process, given, process.point(i));
+                    low_rank.take_from(covariances, given, low_rank.inducing(i));
+                    let (b, explained) =
+                        scratch.explain(given.len(), |a| low_rank.rest_variance(process, given[a] as usize));
                     let variance = low_rank.rest_variance(process, i) - explained;
                     Ok((b.to_vec(), variance.max(process.least_variance(i))))
                 },

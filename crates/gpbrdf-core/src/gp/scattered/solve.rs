@@ -38,7 +38,9 @@ pub(crate) struct Conditioned {
 pub(crate) fn fit_process(problem: &Problem<'_>) -> Result<(Conditioned, FitReport)> {
     problem.noise.validate()?;
     let Found { data, state, space, widening, mut report } = match problem.basis {
-        Some(basis) if problem.angles.len() > exact::MOST_SAMPLES => search_with_basis(problem, basis)?,
+        Some(basis) if problem.angles.len() > exact::MOST_SAMPLES && !problem.factorises => {
+            search_with_basis(problem, basis)?
+        }
         _ => search(problem)?,
     };
     let (gp, value) = state.condition(&problem.watch.part(left_out_share(problem), 1.0), &data)?;

@@ -48,6 +48,7 @@ fn with_problem<R>(targets: &[Vec<f64>], outliers: Outliers, run: impl FnOnce(&P
         usual_variance: None,
         prior: None,
         basis: None,
+        factorises: false,
         outliers,
         optimize: &optimize,
         watch: &watch,
@@ -295,7 +296,7 @@ fn regions_that_are_left_out_leave_what_a_fit_without_them_predicts() {
         let dense = DenseGp::fit_at(&known, &targets, CHANNELS, kernel.clone(), 0.02).unwrap();
         let mean = dense.predict_mean(&points[centre]).unwrap();
         let variance = dense.predict_variance_latent(&points[centre]).unwrap()[0];
-        let mut scratch = Scratch::new(60);
+        let mut scratch = Scratch::new(&kernel);
         let (b, latent) = scratch.condition(&process, centre, &outside);
         let near: f64 = b.iter().zip(&outside).map(|(b, &j)| b * y[0][j as usize]).sum();
         assert!((latent - variance).abs() < 1e-8 && (near - mean[0]).abs() < 1e-8);

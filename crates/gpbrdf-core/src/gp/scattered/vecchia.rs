@@ -33,11 +33,10 @@ pub(super) fn log_likelihood(
     subset: &[u32],
 ) -> (f64, Vec<f64>) {
     let parameters = process.n_parameters() + 1;
-    let count = neighbours.largest();
     let blocks: Vec<(f64, Vec<f64>)> = subset
         .par_chunks(BLOCK)
         .map_init(
-            || Conditional::new(count, process.n_parameters()),
+            || Conditional::new(process),
             |conditional, block| {
                 let mut gradient = vec![0.0; parameters];
                 let density = |i: u32| {
@@ -59,10 +58,9 @@ pub(super) fn log_likelihood(
 #[derive(Debug)]
 struct Conditional {
     scratch: Scratch,
-    /// Derivatives of kernel values: of each pair of samples, of each sample with the point, of the point with
-    /// itself.
+    /// What multiplies the derivative of each pair's covariance.
     pairs: Vec<f64>,
-    point: Vec<f64>,
+    /// Derivatives of the kernel between a point and itself.
     own: Vec<f64>,
     /// Coefficients of the samples in the mean of the point.
     coefficients: Vec<f64>,
@@ -72,15 +70,17 @@ struct Conditional {
 }
 
 impl Conditional {
-    fn new(count: usize, parameters: usize) -> Self {
+    fn new(process: &Process<'_>) -> Self {
+        let mut own = vec![0.0; process.kernel.n_parameters()];
+        let origin = vec![0.0; process.kernel.dimension()];
+        process.kernel.gradient(&origin, &origin, &mut own);
         Self {
-            scratch: Scratch::new(count),
-            pairs: vec![0.0; count * (count + 1) / 2 * parameters],
-            point: vec![0.0; count * parameters],
-            own: vec![0.0; parameters],
-            coefficients: vec![0.0; count],
-            weights: vec![0.0; count],
-            side: vec![0.0; count],
+            scratch: Scratch::new(process.kernel),
+            pairs: Vec::new(),
+            own,
+            coefficients: Vec::new(),
+            weights: Vec::new(),
+            side: Vec::new(),
         }
     }
 
@@ -97,65 +97,67 @@ impl Conditional {
         given: &[u32],
         gradient: &mut [f64],
     ) -> f64 {
-        let (m, parameters) = (given.len(), process.n_parameters());
-        let at = |a: usize| given[a] as usize;
-        // A pair and its place in the lower triangle.
-        let place = |a: usize, b: usize| (a * (a + 1) / 2 + b) * parameters;
-        let (pairs, with_point) = (&mut self.pairs, &mut self.point);
-        let (coefficients, explained) = self.scratch.explain(
-            m,
-            |a, b| {
-                let out = &mut pairs[place(a, b)..place(a, b) + parameters];
-                process.gradient(at(a), at(b), out)
-            },
-            |a| process.diagonal(at(a)),
-            |a| {
-                let out = &mut with_point[a * parameters..(a + 1) * parameters];
-                process.gradient(at(a), i, out)
-            },
-        );
-        self.coefficients[..m].copy_from_slice(coefficients);
-        let b = &self.coefficients[..m];
-        process.gradient(i, i, &mut self.own);
+        let m = given.len();
+        self.scratch.covary(process, given, process.point(i));
+        self.scratch.add_basis(process, given, i);
+        let (b, explained) = self.scratch.explain(m, |a| process.diagonal(given[a] as usize));
+        self.coefficients.clear();
+        self.coefficients.extend_from_slice(b);
+        let b = &self.coefficients;
         let variance = (process.diagonal(i) - explained).max(process.least_variance(i));
         let channels = targets.y.len() as f64;
         let mut density = -0.5 * channels * (std::f64::consts::TAU * variance).ln();
         let mut slope_of_variance = -0.5 * channels / variance;
-        self.side[..m].fill(0.0);
+        self.side.clear();
+        self.side.resize(m, 0.0);
         for y in targets.y {
-            let weights = &mut self.weights[..m];
-            weights.iter_mut().zip(given).for_each(|(w, &j)| *w = y[j as usize]);
-            let residual = y[i] - b.iter().zip(&*weights).map(|(b, y)| b * y).sum::<f64>();
+            self.weights.clear();
+            self.weights.extend(given.iter().map(|&j| y[j as usize]));
+            let residual = y[i] - b.iter().zip(&self.weights).map(|(b, y)| b * y).sum::<f64>();
             density -= 0.5 * residual * residual / variance;
             slope_of_variance += 0.5 * (residual / variance).powi(2);
-            self.scratch.solve(weights);
-            for (side, w) in self.side.iter_mut().zip(weights) {
+            self.scratch.solve(&mut self.weights);
+            for (side, w) in self.side.iter_mut().zip(&self.weights) {
                 *side += residual / variance * *w;
             }
         }
-        let Some((of_noise, of_kernel)) = gradient.split_last_mut() else { return density };
         // What multiplies q in the derivative of the density.
-        let of_q = |a: usize| self.side[a] - slope_of_variance * b[a];
+        let of_q: &mut Vec<f64> = &mut self.side;
+        of_q.iter_mut().zip(b).for_each(|(side, b)| *side -= slope_of_variance * b);
+        self.pairs.clear();
+        for a in 0..m {
+            // -dK_al multiplies q_a b_l and q_l b_a.
+            let others = of_q[a + 1..].iter().zip(&b[a + 1..]);
+            self.pairs.extend(others.map(|(of_q_l, b_l)| -(of_q[a] * b_l + of_q_l * b[a])));
+            self.pairs.push(of_q[a] - slope_of_variance * b[a]);
+        }
+        let Some((of_noise, of_process)) = gradient.split_last_mut() else { return density };
+        let (of_kernel, of_basis) = of_process.split_at_mut(self.own.len());
+        self.scratch.add_gradient(process.kernel, &self.pairs, of_kernel);
+        let of_own: f64 = slope_of_variance - of_q.iter().zip(b).map(|(q, b)| q * b).sum::<f64>();
         for (out, own) in of_kernel.iter_mut().zip(&self.own) {
-            *out += slope_of_variance * own;
+            *out += of_own * own;
         }
         *of_noise += slope_of_variance * targets.shared_noise[i];
-        for a in 0..m {
-            process.gradient(at(a), at(a), &mut self.pairs[place(a, a)..place(a, a) + parameters]);
-            for l in 0..=a {
-                // -dK_al multiplies q_a b_l and q_l b_a.
-                let weight = if l == a { of_q(a) * b[a] } else { of_q(a) * b[l] + of_q(l) * b[a] };
-                let pair = &self.pairs[place(a, l)..place(a, l) + parameters];
-                for (out, d) in of_kernel.iter_mut().zip(pair) {
-                    *out -= weight * d;
-                }
-            }
-            let weight = of_q(a) - slope_of_variance * b[a];
-            for (out, d) in of_kernel.iter_mut().zip(&self.point[a * parameters..(a + 1) * parameters]) {
-                *out += weight * d;
-            }
-            *of_noise -= of_q(a) * b[a] * targets.shared_noise[given[a] as usize];
+        for ((of_q, b), &j) in of_q.iter().zip(b).zip(given) {
+            *of_noise -= of_q * b * targets.shared_noise[j as usize];
+        }
+        if let Some(of_basis) = of_basis.first_mut() {
+            *of_basis += self.of_basis(process, i, given, slope_of_variance);
         }
         density
+    }
+
+    /// The derivative of the log density with respect to the logarithm of the variance of the basis.
+    fn of_basis(&self, process: &Process<'_>, i: usize, given: &[u32], slope_of_variance: f64) -> f64 {
+        let row = |a: usize| process.basis.row(given.get(a).map_or(i, |&j| j as usize));
+        let all = 0..=given.len();
+        let pairs = all.clone().flat_map(|a| all.clone().skip(a + 1).map(move |b| (a, b)));
+        let of_pairs =
+            pairs.zip(&self.pairs).map(|((a, b), weight)| weight * process.in_basis(row(a), row(b)));
+        let of_samples = self.side.iter().zip(&self.coefficients).enumerate();
+        let of_samples = of_samples.map(|(a, (q, b))| q * b * process.in_basis(row(a), row(a)));
+        slope_of_variance * process.in_basis(row(given.len()), row(given.len())) + of_pairs.sum::<f64>()
+            - of_samples.sum::<f64>()
     }
 }

@@ -142,7 +142,7 @@ impl Widening {
         let predicted = centres
             .into_par_iter()
             .map_init(
-                || Scratch::new(NEAREST),
+                || Scratch::new(process.kernel),
                 |scratch, centre| {
                     steps.take()?;
                     let found = RADII.iter().filter_map(|radius| {

@@ -32,11 +32,17 @@ enum Click {
     Retry,
 }
 
+/// Where the selected material is to be written.
+#[derive(Debug)]
+enum Message {
+    Model(PathBuf),
+    Table(PathBuf),
+}
+
 /// The pane of the model.
 pub(crate) struct ModelPane {
-    /// Paths to which the model of the selected material is to be written.
-    outbox: Outbox<PathBuf>,
-    inbox: Receiver<PathBuf>,
+    outbox: Outbox<Message>,
+    inbox: Receiver<Message>,
 }
 
 impl ModelPane {
@@ -70,15 +76,26 @@ impl Pane for ModelPane {
                 title: "Save model",
                 help: "The fitted model with its weights, as safetensors.",
                 access: Access::Write { name: "model.safetensors" },
-                answer: self.outbox.clone(),
+                answer: self.outbox.map(Message::Model),
+            }));
+        }
+        if offers.offer(Command::menu("Export table…")) {
+            cx.order(Order::Ask(Question {
+                title: "Export table",
+                help: "The prediction, as the name says: .binary (MERL), .exr, .bsdf (RGL), .csv (samples), or \
+                       .dds, .ktx2, .npy or .bin (texture).",
+                access: Access::Write { name: "table.binary" },
+                answer: self.outbox.map(Message::Table),
             }));
         }
     }
 
     fn receive(&mut self, _ctx: &Context, cx: &mut PaneContext) {
-        while let Ok(path) = self.inbox.try_recv() {
-            if let Some(document) = cx.documents.selected() {
-                export::model(document, &path, &cx.saved);
+        while let Ok(message) = self.inbox.try_recv() {
+            let Some(document) = cx.documents.selected() else { continue };
+            match message {
+                Message::Model(path) => export::model(document, &path, &cx.saved),
+                Message::Table(path) => export::table(document, &path, &cx.saved),
             }
         }
     }

@@ -126,7 +126,7 @@ impl Pane for Slices {
         if offers.offer(Command::menu("Export slices…")) {
             cx.order(Order::Ask(Question {
                 title: "Export slices",
-                help: "A PNG figure, and linear slices as EXR files beside it.",
+                help: "A figure (.png, .svg or .pdf), and linear slices as EXR files beside it.",
                 access: Access::Write { name: "slices.png" },
                 answer: self.outbox.map(Message::Export),
             }));

@@ -117,7 +117,7 @@ impl Pane for ThreeD {
         if offers.offer(Command::menu("Export picture…")) {
             cx.order(Order::Ask(Question {
                 title: "Export picture",
-                help: "The lit object as a PNG figure, and linear pictures as EXR files beside it.",
+                help: "The lit object as a figure (.png, .svg or .pdf), and linear pictures as EXR files beside it.",
                 access: Access::Write { name: "picture.png" },
                 answer: self.outbox.map(Message::Export),
             }));
