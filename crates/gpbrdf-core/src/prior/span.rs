@@ -78,11 +78,15 @@ impl Span {
     /// Values of several functions without their constants: rows with one value per function. `coefficients` has one
     /// column of `n` per function. Cost: `n` kernel values and `n` multiply-adds per function for each direction.
     pub(crate) fn values(&self, coefficients: &[f64], angles: &[HalfDiff]) -> Vec<f64> {
-        let x = SPACE.points(angles);
-        let at = Points::new(&x, &self.kernel.metric);
+        self.values_at(coefficients, &SPACE.points(angles))
+    }
+
+    /// [`Span::values`] at points of [`SPACE`], rows of coordinates.
+    pub(crate) fn values_at(&self, coefficients: &[f64], points: &[f64]) -> Vec<f64> {
+        let at = Points::new(points, &self.kernel.metric);
         let n = self.len();
         let count = coefficients.len() / n;
-        let mut out = vec![0.0; angles.len() * count];
+        let mut out = vec![0.0; at.len() * count];
         if count == 0 {
             return out;
         }

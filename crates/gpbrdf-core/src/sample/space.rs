@@ -243,7 +243,8 @@ fn polar_coordinates(angles: HalfDiff) -> (f64, [f64; 2]) {
     let polar = |side: f64| {
         let x = sin_h * cos_d + side * cos_h * sin_d * cos_phi;
         let z = cos_h * cos_d - side * sin_h * sin_d * cos_phi;
-        stretched(z.max(0.0), x.hypot(sin_d * sin_phi).atan2(z.max(0.0)))
+        let y = sin_d * sin_phi;
+        stretched(z.max(0.0), (x * x + y * y).sqrt().atan2(z.max(0.0)))
     };
     ((theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT), [polar(1.0), polar(-1.0)])
 }

@@ -8,7 +8,8 @@ use crate::gpu_types::narrow;
 const TOLERANCE: f64 = 4e-6;
 /// Largest error of the residual deviation, as a share of the prior one.
 const DEVIATION_TOLERANCE: f64 = 2e-5;
-/// The largest number of pieces between two breaks.
+/// The numbers of pieces between two breaks, both even: the first that is tried, and the largest.
+const FEWEST_PIECES: usize = 4;
 const MOST_PIECES: usize = 64;
 /// The places of a piece where its cubic interpolates.
 const NODES: [f64; 4] = [0.0, 0.25, 0.75, 1.0];
@@ -39,24 +40,38 @@ pub(super) struct AxisTable {
 }
 
 impl AxisTable {
-    /// Tabulates the functions of the second axis, whose nodes are at `nodes`, with as few pieces as the
+    /// Tabulates the functions of the second axis, whose nodes are at `nodes`, with about as few pieces as the
     /// tolerances allow.
     pub(super) fn new(form: &SeparableForm<'_>, nodes: &[f64]) -> Self {
         let breaks = breaks(nodes);
-        let mut pieces = 4;
+        let mut pieces = FEWEST_PIECES;
         loop {
             let fit = Fit::new(form, &breaks, pieces);
-            if fit.is_good() || pieces >= MOST_PIECES {
+            let excess = fit.excess();
+            if excess <= 1.0 || pieces >= MOST_PIECES {
                 return Self {
                     breaks: breaks.into_iter().map(narrow).collect(),
                     pieces,
-                    cubics: fit.cubics.into_iter().flatten().map(|cubic| cubic.map(narrow)).collect(),
+                    cubics: fit.cubics,
                     prior: fit.prior,
                 };
             }
-            pieces *= 2;
+            pieces = more_pieces(pieces, excess);
         }
     }
+}
+
+/// The number of pieces for which the largest error, which is larger than allowed by the factor `excess`, is expected to
+/// be small enough: that of a cubic falls with the fourth power.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "between 1 and the largest number"
+)]
+fn more_pieces(pieces: usize, excess: f64) -> usize {
+    let wanted = 1.05 * pieces as f64 * excess.powf(0.25);
+    let half = (0.5 * wanted.min(MOST_PIECES as f64)).ceil() as usize;
+    (2 * half).clamp(pieces + 2, MOST_PIECES)
 }
 
 /// The ends of intervals: 0, the nodes between, and 1.
@@ -70,8 +85,8 @@ fn breaks(nodes: &[f64]) -> Vec<f64> {
 
 /// Cubics for a number of pieces, and how far they are off.
 struct Fit {
-    /// `[interval and piece][function, then the residual deviation]`.
-    cubics: Vec<Vec<[f64; 4]>>,
+    /// `[interval][piece][function, then the residual deviation]`.
+    cubics: Vec<[f32; 4]>,
     prior: f64,
     /// The largest value of each function, then that of the residual deviation, at the points of [`CHECKS`].
     largest: Vec<f64>,
@@ -81,31 +96,33 @@ struct Fit {
 
 impl Fit {
     fn new(form: &SeparableForm<'_>, breaks: &[f64], pieces: usize) -> Self {
-        let (values, prior) = functions(form, &points(breaks, pieces, &NODES));
-        let cubics: Vec<Vec<[f64; 4]>> = values
-            .chunks(NODES.len())
-            .map(|rows| (0..rows[0].len()).map(|f| cubic([0, 1, 2, 3].map(|n| rows[n][f]))).collect())
-            .collect();
-        let mut largest = vec![0.0f64; form.shape()[1] + 1];
-        let mut error = largest.clone();
-        let (checks, _) = functions(form, &points(breaks, pieces, &CHECKS));
-        for (cubics, rows) in cubics.iter().zip(checks.chunks(CHECKS.len())) {
-            for (row, x) in rows.iter().zip(CHECKS) {
-                for (f, value) in row.iter().enumerate() {
-                    let [a, b, c, d] = cubics[f];
-                    let found = a + x * (b + x * (c + x * d));
+        let at = [&NODES[..], &CHECKS].concat();
+        let basis = form.basis(1, &points(breaks, pieces, &at));
+        let count = form.shape()[1];
+        let (mut largest, mut error) = (vec![0.0f64; count + 1], vec![0.0f64; count + 1]);
+        let mut cubics = Vec::with_capacity((count + 1) * pieces * (breaks.len() - 1));
+        for (values, residual) in basis.values.chunks(count * at.len()).zip(basis.residual.chunks(at.len())) {
+            for f in 0..=count {
+                let value = |k: usize| if f < count { values[k * count + f] } else { residual[k].sqrt() };
+                let [a, b, c, d] = cubic([0, 1, 2, 3].map(value));
+                for (k, x) in (NODES.len()..).zip(CHECKS) {
+                    let value = value(k);
                     largest[f] = largest[f].max(value.abs());
-                    error[f] = error[f].max((found - value).abs());
+                    error[f] = error[f].max((a + x * (b + x * (c + x * d)) - value).abs());
                 }
+                cubics.push([a, b, c, d].map(narrow));
             }
         }
-        Self { cubics, prior, largest, error }
+        Self { cubics, prior: basis.prior.first().copied().unwrap_or(0.0), largest, error }
     }
 
-    fn is_good(&self) -> bool {
-        let Some((deviation, errors)) = self.error.split_last() else { return true };
-        errors.iter().zip(&self.largest).all(|(error, largest)| *error <= TOLERANCE * largest)
-            && *deviation <= DEVIATION_TOLERANCE * self.prior.sqrt()
+    /// The largest error relative to what is allowed.
+    fn excess(&self) -> f64 {
+        let Some((deviation, errors)) = self.error.split_last() else { return 0.0 };
+        let of_functions = errors.iter().zip(&self.largest).filter(|(error, _)| **error > 0.0);
+        of_functions
+            .map(|(error, largest)| error / (TOLERANCE * largest))
+            .fold(deviation / (DEVIATION_TOLERANCE * self.prior.sqrt()), f64::max)
     }
 }
 
@@ -119,14 +136,6 @@ fn points(breaks: &[f64], pieces: usize, at: &[f64]) -> Vec<f64> {
         }
     }
     points
-}
-
-/// At each point the value of each function and, last, the residual deviation; and the prior variance.
-fn functions(form: &SeparableForm<'_>, points: &[f64]) -> (Vec<Vec<f64>>, f64) {
-    let basis = form.basis(1, points);
-    let rows = basis.values.chunks(form.shape()[1]).zip(&basis.residual);
-    let rows = rows.map(|(row, residual)| row.iter().copied().chain([residual.sqrt()]).collect());
-    (rows.collect(), basis.prior.first().copied().unwrap_or(0.0))
 }
 
 /// The place in an interval, `s`, of the graded coordinate `q`; both in `[0, 1]`.
@@ -162,6 +171,15 @@ mod tests {
         let places: Vec<f64> = (0..=64).map(|k| graded(f64::from(k) / 64.0)).collect();
         assert!(places.windows(2).all(|ends| ends[0] < ends[1]), "{places:?}");
         assert_eq!([places[0], places[32], places[64]], [0.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn more_pieces_are_an_even_number_up_to_the_largest() {
+        // 16 times the error allowed takes twice as many, and 5 % for safety.
+        assert_eq!(more_pieces(4, 16.0), 10);
+        assert_eq!(more_pieces(10, 1.001), 12);
+        assert_eq!(more_pieces(62, 1e9), MOST_PIECES);
+        assert_eq!(more_pieces(4, f64::INFINITY), MOST_PIECES);
     }
 
     #[test]

@@ -1,11 +1,16 @@
 //! A lattice process as a sum of products of well-scaled functions of one coordinate each.
 
+use rayon::prelude::*;
+
 use crate::base::error::Result;
-use crate::base::linalg::{Matrix, product, view};
+use crate::base::linalg::{Matrix, product_into_slice, view};
 use crate::gp::lattice::{LatticeGp, Spectrum};
 
 /// An eigenvector whose eigenvalue is below this share of the largest one consists of rounding errors only.
 const SMALLEST_SHARE: f64 = 1e-15;
+
+/// The number of points of a parallel task.
+const POINTS: usize = 256;
 
 /// A lattice process in the form that single precision can evaluate:
 /// `mean(x) = sum_ijk coefficients_ijk a_i(x_0) b_j(x_1) c_k(x_2)`.
@@ -40,7 +45,8 @@ pub struct AxisBasis {
 }
 
 impl<'a> SeparableForm<'a> {
-    /// Computes the separable form of a process. Costs `O(n (A + B + C))` for each channel.
+    /// Computes the separable form of a process. Costs `O(n)` for each channel, and `O(n (A + B + C))` the first time for
+    /// a process that was loaded from a file.
     ///
     /// # Errors
     /// Those of [`LatticeGp::predict_variance_latent`].
@@ -57,8 +63,7 @@ impl<'a> SeparableForm<'a> {
                 roots[k].iter().map(|root| if *root > 0.0 { root.recip() } else { 0.0 }).collect();
             Matrix::from_fn(n, n, |i, j| vectors[(i, j)] * factors[j])
         });
-        let transposed = eigen.each_ref().map(|e| view(&e.vectors).transpose());
-        let mut coefficients = crate::gp::contract(transposed, gp.weights(), gp.data().channels);
+        let mut coefficients = gp.spectral_weights()?.to_vec();
         let [a, b, c] = gp.data().shape();
         let products: Vec<f64> =
             (0..a * b * c).map(|n| roots[0][n / (b * c)] * roots[1][n / c % b] * roots[2][n % c]).collect();
@@ -92,11 +97,14 @@ impl<'a> SeparableForm<'a> {
     /// Evaluates the functions of axis `k` at `points`, given by their kernel coordinates.
     #[must_use]
     pub fn basis(&self, k: usize, points: &[f64]) -> AxisBasis {
-        let product = product(view(&self.gp.cross(k, points)), view(&self.whitening[k]));
-        let values: Vec<f64> =
-            (0..points.len()).flat_map(|i| product.row(i).iter().copied().collect::<Vec<_>>()).collect();
+        let count = self.shape()[k];
+        let mut values = vec![0.0; count * points.len()];
+        values.par_chunks_mut(count * POINTS).zip(points.par_chunks(POINTS)).for_each(|(values, points)| {
+            // The values of one point are a column of this.
+            let cross = self.gp.cross(k, points);
+            product_into_slice(values, view(&self.whitening[k]).transpose(), view(&cross).transpose());
+        });
         let prior: Vec<f64> = points.iter().map(|&x| self.gp.axis_variance(k, x)).collect();
-        let count = product.ncols();
         let explained = values.chunks(count).map(|row| row.iter().map(|x| x * x).sum::<f64>());
         let residual = prior.iter().zip(explained).map(|(p, s)| (p - s).max(0.0)).collect();
         AxisBasis { values, prior, residual }

@@ -1,5 +1,6 @@
 //! The process with a learned prior as a posterior of a model.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -144,9 +145,13 @@ impl LearnedPosterior {
 
     /// The part of the mean that is due to the kernels, and the prior's part.
     fn means(&self, angles: &[HalfDiff]) -> impl Iterator<Item = ([f64; 3], [f64; 3])> + '_ {
-        let [bright, coloured] =
-            self.parts.each_ref().map(|part| part.gp.mean_at(&part.space.points(angles)));
-        let trend = self.prior.span().values(&self.trend, angles);
+        // Coordinates take long, and the spaces are usually the same.
+        let in_prior = SPACE.points(angles);
+        let points = |space: InputSpace| {
+            if space == SPACE { Cow::Borrowed(&in_prior) } else { Cow::Owned(space.points(angles)) }
+        };
+        let [bright, coloured] = self.parts.each_ref().map(|part| part.gp.mean_at(&points(part.space)));
+        let trend = self.prior.span().values_at(&self.trend, &in_prior);
         (0..bright.len()).map(move |i| {
             let own = from_opponent([bright[i], coloured[2 * i], coloured[2 * i + 1]]);
             (own, std::array::from_fn(|c| self.constants[c] + trend[3 * i + c]))

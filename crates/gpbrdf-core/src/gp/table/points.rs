@@ -21,6 +21,9 @@ const STEP: usize = 3;
 const MEANS: usize = 512;
 const VARIANCES: usize = 128;
 
+/// The fewest values of the BRDF that a parallel task computes.
+const MANY_VALUES: usize = 1024;
+
 fn at_a_time(per_thread: usize) -> usize {
     per_thread * rayon::current_num_threads()
 }
@@ -61,16 +64,20 @@ pub(crate) fn bake_mean(
             watch.reach((i as f64 + share) / N_THETA_H as f64)?;
             means.extend(posterior.predict_mean(some));
         }
+        let value = |(at, mean): (usize, f64)| {
+            to_f32(table.transform.inverse(table.offsets[table.first_channel + at % channels] + mean))
+        };
+        let values: Vec<f32> =
+            means.into_par_iter().enumerate().with_min_len(MANY_VALUES).map(value).collect();
         for p in 0..N_PHI_D {
             let column = if columns == N_PHI_D { p } else { mirrored_column(p) };
-            let means = &means[starts[column] * channels..starts[column + 1] * channels];
-            let cells = means.len() / channels;
+            let values = &values[starts[column] * channels..starts[column + 1] * channels];
+            let cells = values.len() / channels;
             for d in 0..N_THETA_D {
                 let at = d.min(cells - 1) * channels;
                 let cell = &mut slab[cell_index(0, d, p)];
-                for (channel, mean) in (table.first_channel..).zip(&means[at..at + channels]) {
-                    cell[channel] = to_f32(table.transform.inverse(table.offsets[channel] + mean));
-                }
+                cell[table.first_channel..table.first_channel + channels]
+                    .copy_from_slice(&values[at..at + channels]);
             }
         }
     }
