@@ -61,8 +61,8 @@ impl AxisTable {
     }
 }
 
-/// The number of pieces for which the largest error, which is larger than allowed by the factor `excess`, is expected to
-/// be small enough: that of a cubic falls with the fourth power.
+/// The number of pieces for which the largest error, which is larger than allowed by the factor `excess`, is expected
+/// to be small enough: that of a cubic falls with the fourth power.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

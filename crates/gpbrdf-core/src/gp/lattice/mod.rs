@@ -131,8 +131,8 @@ impl LatticeGp {
         Ok(self.spectrum.get_or_init(|| made))
     }
 
-    /// The weights in the eigenbasis. A process that was loaded from a file computes them when they are first needed, in
-    /// `O(n (A + B + C))` per channel.
+    /// The weights in the eigenbasis. A process that was loaded from a file computes them when they are first needed,
+    /// in `O(n (A + B + C))` per channel.
     pub(crate) fn spectral_weights(&self) -> Result<&[f64]> {
         if let Some(known) = self.spectral_weights.get() {
             return Ok(known);

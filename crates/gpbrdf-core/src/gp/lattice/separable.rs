@@ -45,8 +45,8 @@ pub struct AxisBasis {
 }
 
 impl<'a> SeparableForm<'a> {
-    /// Computes the separable form of a process. Costs `O(n)` for each channel, and `O(n (A + B + C))` the first time for
-    /// a process that was loaded from a file.
+    /// Computes the separable form of a process. Costs `O(n)` for each channel, and `O(n (A + B + C))` the first time
+    /// for a process that was loaded from a file.
     ///
     /// # Errors
     /// Those of [`LatticeGp::predict_variance_latent`].
