@@ -11,8 +11,10 @@ mod cli {
     mod commands;
     mod dense;
     mod device;
+    mod faults;
     mod inducing;
     mod instruments;
+    mod kills;
     mod measured;
     mod odd_input;
     mod plan;

@@ -1,5 +1,5 @@
 //! Damaged files of every kind are accepted or refused: no reader panics, and none takes memory that its file does not
-//! account for. `GPBRDF_CORPUS=FOLDER` writes the files to start from, for fuzzers.
+//! account for. With `GPBRDF_CORPUS=FOLDER` it writes the files to start from, for fuzzers, and damages none.
 #![allow(clippy::unwrap_used, reason = "tests state exact expectations")]
 
 #[path = "readers/corpus.rs"]
@@ -60,6 +60,9 @@ fn no_reader_panics_or_takes_more_memory_than_a_file_accounts_for() {
             }
             let start = std::time::Instant::now();
             assert!(check(name, reader, bytes, "the whole file"), "{name}: file {i} is refused");
+            if folder.is_some() {
+                continue;
+            }
             let mut refused = 0;
             // A table of 35 MB is not changed as often.
             let copies = if bytes.len() > 1 << 20 { copies.div_ceil(400) } else { copies };

@@ -6,6 +6,7 @@ mod viewer {
     mod directions;
     mod driver;
     mod files;
+    mod long_life;
     mod model;
     mod mouse;
     mod objects;

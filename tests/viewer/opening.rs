@@ -267,3 +267,20 @@ fn files_are_taken_by_what_they_hold_and_sessions_keep_them() {
     shown(&mut driver, "Shape", "mesh");
     assert!(!driver.shows("cannot read"), "{:?}", driver.texts());
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_display_there_is_one_line_and_no_window() {
+    use std::process::Command;
+    for display in [None, Some(":4095")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gpbrdf-viewer"));
+        command.env_clear().arg("ward").envs(display.map(|name| ("DISPLAY", name)));
+        let output = command.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: cannot open a window: ") && said.ends_with('\n'), "{said}");
+        assert!(said.lines().count() == 1 && !said.contains(".rs:"), "{said}");
+        assert!(display.is_some() || said.contains("DISPLAY is set"), "{said}");
+        assert!(output.stdout.is_empty());
+    }
+}

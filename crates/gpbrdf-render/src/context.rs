@@ -1,7 +1,7 @@
 //! The graphics device.
 
 use std::fmt;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use crate::error::{Error, Result};
@@ -33,6 +33,8 @@ pub struct Context {
     info: wgpu::AdapterInfo,
     /// Why the device is gone, once it is.
     lost: Arc<OnceLock<String>>,
+    /// What the device has rejected outside of [`Context::guard`], until that or [`Context::wait`] tells it.
+    rejected: Arc<Mutex<Option<String>>>,
 }
 
 impl fmt::Debug for Context {
@@ -79,14 +81,20 @@ impl Context {
         context.device.set_device_lost_callback(move |reason, message| {
             let _first_reason_stays = lost.set(format!("{reason:?} {message}"));
         });
+        // Without this wgpu panics, for example where a device is lost between two guards.
+        let rejected = context.rejected.clone();
+        context.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            rejected.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error.to_string());
+        }));
         Ok(context)
     }
 
     /// Works on a device that the caller has opened on `adapter`. Its features decide which of the optional
-    /// ones are used. The caller, not this context, is notified when the device is lost.
+    /// ones are used. The caller, not this context, is notified when the device is lost, and handles what it rejects
+    /// outside of [`Context::guard`].
     #[must_use]
     pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        Self { device, queue, info: adapter.get_info(), lost: Arc::default() }
+        Self { device, queue, info: adapter.get_info(), lost: Arc::default(), rejected: Arc::default() }
     }
 
     /// The device.
@@ -152,16 +160,21 @@ impl Context {
             let error = pollster::block_on(scope.pop());
             first = first.or(error);
         }
-        if first.is_some() {
+        let rejected = self.take_rejected();
+        if first.is_some() || rejected.is_some() {
             // A lost device may be the cause. It is reported when the device is polled.
             let _polled = self.device.poll(WAIT);
         }
         self.check_lost(what)?;
         match first {
-            None => Ok(result),
+            None => rejected.map_or(Ok(result), |message| Err(Error::Gpu { what: what.to_owned(), message })),
             Some(wgpu::Error::OutOfMemory { .. }) => Err(Error::OutOfMemory { what: what.to_owned() }),
             Some(error) => Err(Error::Gpu { what: what.to_owned(), message: error.to_string() }),
         }
+    }
+
+    fn take_rejected(&self) -> Option<String> {
+        self.rejected.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     fn check_lost(&self, what: &str) -> Result<()> {
@@ -176,10 +189,13 @@ impl Context {
     /// Waits until everything submitted is done.
     ///
     /// # Errors
-    /// [`Error::Lost`] when the device is gone or takes over two minutes.
+    /// [`Error::Lost`] when the device is gone or takes over two minutes, [`Error::Gpu`] when it has rejected anything.
     pub fn wait(&self, what: &str) -> Result<()> {
         let done = self.device.poll(WAIT);
         self.check_lost(what)?;
+        if let Some(message) = self.take_rejected() {
+            return Err(Error::Gpu { what: what.to_owned(), message });
+        }
         done.map(drop).map_err(|error| Error::Lost { what: what.to_owned(), message: error.to_string() })
     }
 
@@ -261,12 +277,14 @@ impl Context {
     ) -> Result<wgpu::Buffer> {
         let buffer = self.empty_buffer(label, bytes.len() as u64, usage | wgpu::BufferUsages::COPY_DST)?;
         let whole = bytes.len() / 4 * 4;
-        self.queue.write_buffer(&buffer, 0, &bytes[..whole]);
-        if whole < bytes.len() {
-            let mut last = [0; 4];
-            last[..bytes.len() - whole].copy_from_slice(&bytes[whole..]);
-            self.queue.write_buffer(&buffer, whole as u64, &last);
-        }
+        self.guard(label, || {
+            self.queue.write_buffer(&buffer, 0, &bytes[..whole]);
+            if whole < bytes.len() {
+                let mut last = [0; 4];
+                last[..bytes.len() - whole].copy_from_slice(&bytes[whole..]);
+                self.queue.write_buffer(&buffer, whole as u64, &last);
+            }
+        })?;
         Ok(buffer)
     }
 

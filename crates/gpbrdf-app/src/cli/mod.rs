@@ -1,5 +1,6 @@
 //! The command line: parses the arguments, runs a command, prints its error and chooses the exit code.
 
+mod address_space;
 mod bake;
 mod batch;
 mod check;
@@ -95,6 +96,16 @@ enum Command {
     Man(shell::Man),
 }
 
+impl Command {
+    /// Whether the command computes with matrices or tables, which takes buffers for each thread.
+    fn computes(&self) -> bool {
+        !matches!(
+            self,
+            Self::Shader(_) | Self::Info(_) | Self::Materials(_) | Self::Completions(_) | Self::Man(_)
+        )
+    }
+}
+
 /// Runs the command line of this process.
 #[must_use]
 pub fn main() -> ExitCode {
@@ -108,9 +119,18 @@ pub fn main() -> ExitCode {
     if let Err(error) = handler {
         terminal.warn(&format!("Ctrl-C may leave temporary files behind: {error}"));
     }
-    if let Some(threads) = arguments.threads {
-        // This fails only if a pool exists already, and none does yet.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+    let available = || std::thread::available_parallelism().map_or(1, usize::from);
+    let wanted = arguments.threads.map_or_else(available, usize::from);
+    match address_space::threads_within_limit(wanted) {
+        Ok(threads) if arguments.threads.is_some() || threads < wanted => {
+            // This fails only if a pool exists already, and none does yet.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        }
+        Err(error) if arguments.command.computes() => {
+            terminal.error(&one_line(&error));
+            return ExitCode::FAILURE;
+        }
+        Ok(_) | Err(_) => {}
     }
     let result = match arguments.command {
         Command::Bake(command) => command.run(&terminal),

@@ -115,7 +115,7 @@ pub fn main() -> ExitCode {
     loop {
         let start = Instant::now();
         if let Err(error) = run(&arguments, &kept) {
-            eprintln!("error: cannot open a window: {error}");
+            eprintln!("error: cannot open a window: {}", cause(&error.to_string()));
             return ExitCode::FAILURE;
         }
         let lost = kept.borrow().as_ref().and_then(Viewer::loss);
@@ -125,6 +125,13 @@ pub fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     }
+}
+
+/// What the system said, without the place in the sources of winit where it was heard:
+/// `os error at FILE:LINE: CAUSE`.
+fn cause(error: &str) -> &str {
+    let placed = error.split_once("os error at ").and_then(|(_, rest)| rest.split_once(": "));
+    placed.map_or(error, |(_place, cause)| cause).trim_end_matches('.')
 }
 
 /// One window, until it is closed. It goes on with the viewer in `kept`, and leaves its own there when its
@@ -164,6 +171,13 @@ mod tests {
     use clap::CommandFactory as _;
 
     use super::*;
+
+    #[test]
+    fn the_cause_of_an_error_is_told_without_places_in_sources() {
+        let said = "winit EventLoopError: os error at /a b/winit-0.30/mod.rs:765: DISPLAY is not set.";
+        assert_eq!(cause(said), "DISPLAY is not set");
+        assert_eq!(cause("Found no graphics adapter: none"), "Found no graphics adapter: none");
+    }
 
     #[test]
     fn its_help_is_its_own() {

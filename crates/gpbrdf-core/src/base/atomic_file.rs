@@ -1,19 +1,15 @@
 //! Files that appear whole or not at all.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::base::error::{Error, Result};
 
 /// Paths of the temporary files that exist now.
 static PENDING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-/// Number of the next temporary file; it keeps the names of this process apart.
-static COUNTER: AtomicU64 = AtomicU64::new(0);
 
 /// How the name of a temporary file begins.
 const PREFIX: &str = ".gpbrdf-";
@@ -35,6 +31,9 @@ fn pending() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 /// the value is dropped before that, the temporary file is removed and an existing target stays as it was.
 /// The result has the permissions of a normally created file. If the target is a symbolic link, the link
 /// stays and the file that it points to is replaced.
+///
+/// The temporary file is locked while it is written. One whose lock is free belongs to a killed process; the next
+/// file of the same target removes it.
 ///
 /// The data is not forced to the disk: a crash of the process leaves no partial file, but a power cut may.
 #[derive(Debug)]
@@ -61,20 +60,20 @@ impl AtomicFile {
         };
         // The lock is held during the creation, so that no temporary file exists without being registered.
         let mut pending = pending();
-        loop {
-            let number = COUNTER.fetch_add(1, Ordering::Relaxed);
-            let temporary = folder.join(format!("{PREFIX}{}-{number}{SUFFIX}", std::process::id()));
-            match OpenOptions::new().write(true).create_new(true).open(&temporary) {
-                Ok(file) => {
-                    pending.insert(temporary.clone());
-                    let file = BufWriter::with_capacity(BUFFER_BYTES, file);
-                    return Ok(Self { target, temporary, file, committed: false });
-                }
-                // A killed process with the same id left this file behind; the next number is tried.
-                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(error) => return Err(failed(error)),
+        let mut places = (0u64..).map(|number| folder.join(temporary_name(&target, number)));
+        let mut started = None;
+        for place in places.by_ref() {
+            if let Some(file) = start(&place).map_err(failed)? {
+                started = Some((place, file));
+                break;
             }
         }
+        let (temporary, file) = started.ok_or_else(|| failed(io::ErrorKind::AlreadyExists.into()))?;
+        pending.insert(temporary.clone());
+        // What other killed processes have left of this target.
+        while places.next().is_some_and(|place| remove_if_abandoned(&place)) {}
+        let file = BufWriter::with_capacity(BUFFER_BYTES, file);
+        Ok(Self { target, temporary, file, committed: false })
     }
 
     /// The name the file will have.
@@ -199,6 +198,58 @@ pub fn remove_pending() -> PendingRemoved {
     PendingRemoved { _guard: pending }
 }
 
+/// The name of the `number`th temporary file of a target: any length and any characters of the target's name will do.
+fn temporary_name(target: &Path, number: u64) -> String {
+    let name = target.file_name().unwrap_or_default().as_encoded_bytes();
+    // FNV-1a, with 64 bits.
+    let hash = name.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("{PREFIX}{hash:016x}-{number}{SUFFIX}")
+}
+
+/// Creates a temporary file and locks it. What a killed process has left in its place is removed; `None` where a living
+/// one has a file.
+fn start(place: &Path) -> io::Result<Option<File>> {
+    loop {
+        match OpenOptions::new().write(true).create_new(true).open(place) {
+            // Whoever holds the lock of the new file takes it for abandoned and removes it. A file system without locks
+            // gives another error; there no file is ever taken for abandoned.
+            Ok(file) => {
+                let is_mine =
+                    !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && is_at(&file, place);
+                return Ok(is_mine.then_some(file));
+            }
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                if !remove_if_abandoned(place) {
+                    return Ok(None);
+                }
+            }
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+/// Removes a temporary file that nobody has locked. Returns whether it did.
+fn remove_if_abandoned(place: &Path) -> bool {
+    let Ok(file) = OpenOptions::new().write(true).open(place) else { return false };
+    file.try_lock().is_ok() && is_at(&file, place) && fs::remove_file(place).is_ok()
+}
+
+/// Whether an open file still has this name: it may have been renamed or removed since it was opened.
+#[cfg(unix)]
+fn is_at(file: &File, place: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let same = |a: fs::Metadata, b: fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
+    file.metadata().is_ok_and(|open| fs::symlink_metadata(place).is_ok_and(|named| same(open, named)))
+}
+
+/// Whether a file still has this name.
+#[cfg(not(unix))]
+fn is_at(_file: &File, place: &Path) -> bool {
+    place.exists()
+}
+
 /// Follows a final symbolic link of `path`. Fails if something other than a regular file has that name.
 fn resolve(path: &Path) -> io::Result<PathBuf> {
     let Ok(metadata) = fs::symlink_metadata(path) else {
@@ -246,6 +297,7 @@ mod tests {
     // This is one test, since `remove_pending` acts on every file of the process.
     #[test]
     fn files_appear_whole_or_not_at_all() {
+        check_temporary_files_of_others();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.txt");
         fs::write(&path, "old").unwrap();
@@ -297,6 +349,33 @@ mod tests {
         assert_eq!(names(folder.path()), ["a.txt", "b.txt", "c"]);
         assert!(file.commit().is_err());
         assert_eq!(fs::read_to_string(&path).unwrap(), "both");
+    }
+
+    /// What a killed process has left is removed, what a living one writes is not.
+    fn check_temporary_files_of_others() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let mut first = AtomicFile::create(&path).unwrap();
+        let mut second = AtomicFile::create(&path).unwrap();
+        assert_ne!(first.temporary, second.temporary);
+        first.write_all(b"first").unwrap();
+        second.write_all(b"second").unwrap();
+        // Three processes were killed: nobody holds a lock on what they wrote.
+        for number in 2..5 {
+            fs::write(folder.path().join(temporary_name(&path, number)), "half").unwrap();
+        }
+        let other = folder.path().join(temporary_name(Path::new("b.txt"), 0));
+        fs::write(&other, "of another target").unwrap();
+        let third = AtomicFile::create(&path).unwrap();
+        assert_eq!(names(folder.path()).len(), 4, "{:?}", names(folder.path()));
+        assert!(other.exists());
+        third.commit().unwrap();
+        first.commit().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "first");
+        second.commit().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "second");
+        AtomicFile::write(folder.path().join("b.txt"), b"b").unwrap();
+        assert_eq!(names(folder.path()), ["a.txt", "b.txt"]);
     }
 
     #[test]

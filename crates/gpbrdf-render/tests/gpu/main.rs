@@ -5,6 +5,7 @@
 mod bake;
 mod fixtures;
 mod golden;
+mod loss;
 mod scene;
 #[path = "../support/mod.rs"]
 mod support;

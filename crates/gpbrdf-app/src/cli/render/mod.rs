@@ -10,7 +10,7 @@ use clap::{Args, value_parser};
 use gpbrdf_core::base::AtomicFile;
 use gpbrdf_core::base::number::significant;
 use gpbrdf_core::judge::{PixelDifference, exposure_of, psnr, ssim};
-use gpbrdf_core::{BrdfTable, Content, Source};
+use gpbrdf_core::{BrdfTable, Content, Environment, Source};
 use gpbrdf_render::{
     AdapterChoice, BrdfTexture, Camera, Context, Display, EnvironmentLight, Geometry, Light, LinearPicture,
     Mesh, Precision, Projection, Renderer, ShadingOptions, read_mesh,
@@ -144,10 +144,18 @@ impl Render {
             }
         }
         let mut run = Run::new(terminal.clone());
-        // Whatever can fail at once comes first.
+        // Whatever can fail at once comes first, and files before the device, whose driver takes time and memory.
+        let (geometry, camera) = self.scene()?;
+        let map = self.light.is_none().then(|| self.map()).transpose()?;
         let context = Context::open(AdapterChoice::Any)?;
         terminal.detail(&format!("adapter: {}", context.describe()));
-        let mut renderer = self.renderer(&context, terminal)?;
+        let mut renderer = Renderer::new(&context, self.size)?;
+        renderer.set_geometry(&geometry)?;
+        renderer.set_camera(camera)?;
+        renderer.set_light(self.light(&context, map.as_ref(), terminal)?)?;
+        let sampling = self.sampling.into();
+        renderer.set_shading(ShadingOptions { sampling, ..ShadingOptions::default() })?;
+        drop((geometry, map));
         let source = run.stage(Stage::Load, || open(&self.input, self.reading, terminal))?;
         let materials = self.materials(&source, &mut run)?;
         set_materials(&mut renderer, &context, &source, &materials)?;
@@ -159,18 +167,6 @@ impl Render {
         report["outputs"] =
             self.output.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().into();
         self.say(&report, terminal)
-    }
-
-    /// A renderer of the scene, without materials.
-    fn renderer(&self, context: &Context, terminal: &Terminal) -> Result<Renderer> {
-        let mut renderer = Renderer::new(context, self.size)?;
-        let (geometry, camera) = self.scene()?;
-        renderer.set_geometry(&geometry)?;
-        renderer.set_camera(camera)?;
-        renderer.set_light(self.light(context, terminal)?)?;
-        let sampling = self.sampling.into();
-        renderer.set_shading(ShadingOptions { sampling, ..ShadingOptions::default() })?;
-        Ok(renderer)
     }
 
     /// Reads the picture back, and compares prediction and truth where both are there.
@@ -271,18 +267,20 @@ impl Render {
         Ok((geometry, camera.orbited(azimuth.to_radians(), elevation.to_radians())))
     }
 
-    fn light(&self, context: &Context, terminal: &Terminal) -> Result<Light> {
+    /// The environment map.
+    fn map(&self) -> Result<Environment> {
+        environment(self.env.as_deref().filter(|path| *path != Path::new("studio")))
+    }
+
+    /// The light that is chosen, or that of the map.
+    fn light(&self, context: &Context, map: Option<&Environment>, terminal: &Terminal) -> Result<Light> {
         let at = self.light_at.into();
-        Ok(match self.light {
-            // Irradiance pi: a white Lambertian surface that faces the light has radiance 1.
-            Some(LightName::Directional) => {
-                Light::Directional { direction: at, irradiance: [std::f32::consts::PI; 3] }
+        Ok(match (self.light, map) {
+            (Some(LightName::Point), _) => {
+                Light::Point { position: at, intensity: [std::f32::consts::PI; 3] }
             }
-            Some(LightName::Point) => Light::Point { position: at, intensity: [std::f32::consts::PI; 3] },
-            None => {
-                let file = self.env.as_deref().filter(|path| *path != Path::new("studio"));
-                let environment = environment(file)?;
-                let light = EnvironmentLight::for_device(context, &environment)?;
+            (None, Some(environment)) => {
+                let light = EnvironmentLight::for_device(context, environment)?;
                 let size = |width: usize, height: usize| format!("{width} x {height}");
                 let (given, used) = (environment.raster(), light.texels());
                 if given.width() != used.width() {
@@ -293,6 +291,10 @@ impl Render {
                     ));
                 }
                 Light::Environment(light)
+            }
+            // Irradiance pi: a white Lambertian surface that faces the light has radiance 1.
+            (Some(LightName::Directional), _) | (None, None) => {
+                Light::Directional { direction: at, irradiance: [std::f32::consts::PI; 3] }
             }
         })
     }

@@ -336,6 +336,29 @@ mod tests {
     }
 
     #[test]
+    fn subsampled_channels_are_refused_by_name() {
+        let whole = file(&[("BY", RAMP), ("RY", RAMP), ("Y", RAMP)], |_| {});
+        // An entry of the list of channels: name, type, linearity, and the steps along x and y.
+        for name in [&b"\0Y\0"[..], b"BY\0", b"RY\0"] {
+            let mut bytes = whole.clone();
+            let entry = [name, &2u32.to_le_bytes()].concat();
+            let places: Vec<usize> =
+                (0..bytes.len() - entry.len()).filter(|&at| bytes[at..].starts_with(&entry)).collect();
+            assert_eq!(places.len(), 1, "{name:?}");
+            for step in [4, 8] {
+                let at = places[0] + name.len() + 4 + step;
+                bytes[at..at + 4].copy_from_slice(&2u32.to_le_bytes());
+            }
+            let message = refused(&bytes);
+            assert!(
+                message.starts_with("expected the channels R, G and B in full resolution, found "),
+                "{message}"
+            );
+            assert!(message.contains("subsampled channels") && message.contains("RY and BY"), "{message}");
+        }
+    }
+
+    #[test]
     fn the_data_window_is_placed_in_the_display_window() {
         let grey = [("R", RAMP), ("G", RAMP), ("B", RAMP)];
         let moved = |position: (i32, i32), bounds: IntegerBounds| {
