@@ -105,8 +105,14 @@ pub(crate) fn check_finite(angles: &[HalfDiff]) -> Result<()> {
 /// `atan2(1, tan theta_h |cos phi_d|)`, in `[0, pi/2]`.
 #[must_use]
 pub fn theta_d_max(theta_h: f64, phi_d: f64) -> f64 {
+    let (sin_h, cos_h) = theta_h.sin_cos();
+    horizon_theta_d(sin_h, cos_h, phi_d.cos().abs())
+}
+
+/// [`theta_d_max`] from sine and cosine of `theta_h` and `|cos phi_d|`.
+pub(crate) fn horizon_theta_d(sin_h: f64, cos_h: f64, cos_phi: f64) -> f64 {
     // Multiplied by cos(theta_h) so that theta_h = pi/2 needs no infinity.
-    theta_h.cos().max(0.0).atan2(theta_h.sin() * phi_d.cos().abs())
+    cos_h.max(0.0).atan2(sin_h * cos_phi)
 }
 
 /// `phi_d` folded into `[0, pi)`: by reciprocity `phi_d` and `phi_d + pi` are the same pair of directions.

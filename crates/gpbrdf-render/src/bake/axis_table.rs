@@ -1,6 +1,7 @@
 //! Functions of one coordinate as piecewise cubics.
 
 use gpbrdf_core::gp::SeparableForm;
+use rayon::prelude::*;
 
 use crate::gpu_types::narrow;
 
@@ -99,20 +100,37 @@ impl Fit {
         let at = [&NODES[..], &CHECKS].concat();
         let basis = form.basis(1, &points(breaks, pieces, &at));
         let count = form.shape()[1];
-        let (mut largest, mut error) = (vec![0.0f64; count + 1], vec![0.0f64; count + 1]);
-        let mut cubics = Vec::with_capacity((count + 1) * pieces * (breaks.len() - 1));
-        for (values, residual) in basis.values.chunks(count * at.len()).zip(basis.residual.chunks(at.len())) {
-            for f in 0..=count {
-                let value = |k: usize| if f < count { values[k * count + f] } else { residual[k].sqrt() };
-                let [a, b, c, d] = cubic([0, 1, 2, 3].map(value));
-                for (k, x) in (NODES.len()..).zip(CHECKS) {
-                    let value = value(k);
-                    largest[f] = largest[f].max(value.abs());
-                    error[f] = error[f].max((a + x * (b + x * (c + x * d)) - value).abs());
+        // What is known of some pieces: their cubics, the largest values and the largest errors.
+        let of_pieces = |values: &[f64], residual: &[f64], cubics: &mut [[f32; 4]]| {
+            let (mut largest, mut error) = (vec![0.0f64; count + 1], vec![0.0f64; count + 1]);
+            let pieces = values.chunks(count * at.len()).zip(residual.chunks(at.len()));
+            for ((values, residual), cubics) in pieces.zip(cubics.chunks_mut(count + 1)) {
+                for (f, out) in cubics.iter_mut().enumerate() {
+                    let value = |k: usize| if f < count { values[k * count + f] } else { residual[k].sqrt() };
+                    let [a, b, c, d] = cubic([0, 1, 2, 3].map(value));
+                    for (k, x) in (NODES.len()..).zip(CHECKS) {
+                        let value = value(k);
+                        largest[f] = largest[f].max(value.abs());
+                        error[f] = error[f].max((a + x * (b + x * (c + x * d)) - value).abs());
+                    }
+                    *out = [a, b, c, d].map(narrow);
                 }
-                cubics.push([a, b, c, d].map(narrow));
             }
-        }
+            [largest, error]
+        };
+        let mut cubics = vec![[0.0; 4]; (count + 1) * pieces * (breaks.len() - 1)];
+        let intervals = (basis.values.par_chunks(count * at.len() * pieces))
+            .zip(basis.residual.par_chunks(at.len() * pieces))
+            .zip(cubics.par_chunks_mut((count + 1) * pieces));
+        let larger = |a: &mut Vec<f64>, b: Vec<f64>| a.iter_mut().zip(b).for_each(|(a, b)| *a = a.max(b));
+        let nothing = || [vec![0.0; count + 1], vec![0.0; count + 1]];
+        let [largest, error] = intervals
+            .map(|((values, residual), cubics)| of_pieces(values, residual, cubics))
+            .reduce(nothing, |[mut largest, mut error], [other_largest, other_error]| {
+                larger(&mut largest, other_largest);
+                larger(&mut error, other_error);
+                [largest, error]
+            });
         Self { cubics, prior: basis.prior.first().copied().unwrap_or(0.0), largest, error }
     }
 

@@ -254,6 +254,19 @@ impl LatticeGp {
         self.data.axis_variance(k, &self.hyper.kernels[k], x)
     }
 
+    /// Prior variance along axis `k`, without the signal variance, at each point.
+    pub(crate) fn axis_variances(&self, k: usize, points: &[f64]) -> Vec<f64> {
+        let (kernel, metric) = (&self.hyper.kernels[k], self.data.metrics[k]);
+        let own = kernel.value(0.0);
+        let squared = |&x: &f64| self.data.image(k, x).map(|image| metric.distance(x, image).powi(2));
+        // Every point has an image or none has one.
+        let mut images: Vec<f64> = points.iter().filter_map(squared).collect();
+        kernel.fill(&mut images);
+        images.resize(points.len(), 0.0);
+        images.iter_mut().for_each(|variance| *variance += own);
+        images
+    }
+
     fn cross_rows(&self, points: &[[f64; 3]]) -> [Matrix; 3] {
         std::array::from_fn(|k| self.cross(k, &points.iter().map(|p| p[k]).collect::<Vec<_>>()))
     }

@@ -104,7 +104,7 @@ impl<'a> SeparableForm<'a> {
             let cross = self.gp.cross(k, points);
             product_into_slice(values, view(&self.whitening[k]).transpose(), view(&cross).transpose());
         });
-        let prior: Vec<f64> = points.iter().map(|&x| self.gp.axis_variance(k, x)).collect();
+        let prior = self.gp.axis_variances(k, points);
         let explained = values.chunks(count).map(|row| row.iter().map(|x| x * x).sum::<f64>());
         let residual = prior.iter().zip(explained).map(|(p, s)| (p - s).max(0.0)).collect();
         AxisBasis { values, prior, residual }

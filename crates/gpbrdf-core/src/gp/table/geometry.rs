@@ -2,7 +2,9 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::brdf::angles::theta_d_max;
+use rayon::prelude::*;
+
+use crate::brdf::angles::horizon_theta_d;
 use crate::brdf::table::{N_PHI_D, N_THETA_D, N_THETA_H, cell_center};
 use crate::sample::space::{InputSpace, WarpedBox};
 use crate::sample::symmetry::Symmetry;
@@ -30,6 +32,16 @@ pub struct TableGeometry {
 /// Number of distinct `|cos phi_d|` among the table's cells: `phi_d` and `pi - phi_d` share `theta_d_max`.
 const COLUMNS: usize = N_PHI_D / 2;
 
+/// A function of the `theta_d` of the horizon for each `(i_theta_h, column)`.
+fn horizon(of: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
+    let cosines: Vec<f64> = (0..COLUMNS).map(|p| cell_center(0, 0, p).phi_d.cos().abs()).collect();
+    let row = |i: usize| {
+        let (sin_h, cos_h) = cell_center(i, 0, 0).theta_h.sin_cos();
+        cosines.iter().map(|cos_phi| of(horizon_theta_d(sin_h, cos_h, *cos_phi))).collect::<Vec<f64>>()
+    };
+    (0..N_THETA_H).into_par_iter().flat_map_iter(row).collect()
+}
+
 impl TableGeometry {
     /// The geometry of a process in `space`.
     #[must_use]
@@ -39,20 +51,13 @@ impl TableGeometry {
             InputSpace::WarpedBox(WarpedBox { v_density, symmetry, .. }) => {
                 // v^(1/density) = theta_d^(1/density) theta_d_max^(-1/density).
                 let exponent = v_density.recip();
-                let limits = (0..N_THETA_H * COLUMNS).map(|k| {
-                    let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
-                    theta_d_max(center.theta_h, center.phi_d).powf(-exponent)
-                });
                 let rows = if symmetry == Symmetry::Bilateral { COLUMNS } else { N_PHI_D };
-                (theta_d.map(|t| t.powf(exponent)).collect(), limits.collect(), rows)
+                let limits = horizon(|theta_d_max| theta_d_max.powf(-exponent));
+                (theta_d.map(|t| t.powf(exponent)).collect(), limits, rows)
             }
             // v without a density says which cells are above the horizon.
             InputSpace::PolarAngles | InputSpace::DifferenceAngle | InputSpace::PlaneOfIncidence => {
-                let limits = (0..N_THETA_H * COLUMNS).map(|k| {
-                    let center = cell_center(k / COLUMNS, 0, k % COLUMNS);
-                    theta_d_max(center.theta_h, center.phi_d).recip()
-                });
-                (theta_d.collect(), limits.collect(), COLUMNS)
+                (theta_d.collect(), horizon(f64::recip), COLUMNS)
             }
             InputSpace::HalfDiff => (theta_d.collect(), vec![1.0; N_THETA_H * COLUMNS], N_PHI_D),
         };
