@@ -1,5 +1,6 @@
-//! What the processor prepares for the bake of a lattice model of 64 x 32 x 18 nodes, which needs no device; and
-//! baking on the device until the texture is written: this model and a dense one, both RGB.
+//! What the processor prepares for the bake of a lattice model of 64 x 32 x 18 nodes, which needs no device, with new
+//! kernels and with those of a model before; and baking on the device until the texture is written: this model and a
+//! dense one, both RGB.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::hint::black_box;
@@ -31,6 +32,9 @@ fn bake(c: &mut Criterion) {
     let dense_samples = if context.is_hardware() { 4096 } else { 64 };
     let dense = model(&Layout::Random { count: dense_samples, seed: 1 }, Solver::Dense);
     let (Some(dense), Ok(baker)) = (dense, Baker::new(&context)) else { return };
+    c.bench_function("prepare_lattice_36864_again", |b| {
+        b.iter(|| baker.prepare(black_box(&lattice)).is_ok());
+    });
     let Ok(texture) = BrdfTexture::empty(&context, Precision::Half) else { return };
     let mut group = c.benchmark_group("bake");
     group.sample_size(10);

@@ -1,10 +1,12 @@
 //! What the processor computes before a device bakes a model.
 
+use std::sync::Arc;
+
 use gpbrdf_core::Model;
-use gpbrdf_core::gp::{DeviceForm, KernelSum, SeparablePart, TableGeometry};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, LatticeGp, SeparablePart, TableGeometry};
 use gpbrdf_core::sample::InputSpace;
 
-use super::separable::{Placement, Separable};
+use super::separable::{Functions, Placement, Separable};
 use crate::error::{Error, Result};
 
 /// A model as the shaders of the bake read it. It is computed on the processor, so no device is needed yet.
@@ -15,7 +17,7 @@ pub struct Prepared<'a> {
     /// What is added to each channel besides its offset.
     pub(super) constants: [f64; 3],
     /// The cells in the space of the first part.
-    pub(super) geometry: TableGeometry,
+    pub(super) geometry: Arc<TableGeometry>,
     /// Distinct cells of each column, as [`TableGeometry::distinct`], but the smallest number of all parts:
     /// their spaces may differ, and a cell at the horizon may be rounded to either side of it.
     pub(super) distinct: Vec<usize>,
@@ -30,14 +32,57 @@ pub(super) enum Part<'a> {
     KernelSum(KernelSum<'a>, usize),
 }
 
+/// Tables of cells and functions along axes that were computed before, those that were used last.
+#[derive(Debug, Default)]
+pub(super) struct Known {
+    geometries: Vec<(InputSpace, Arc<TableGeometry>)>,
+    functions: Vec<Arc<Functions>>,
+}
+
+/// The largest number of spaces, and of kernels, that are kept: as many as a model with separate channels or of
+/// inducing lattices has, and some more.
+const MOST_KEPT: usize = 8;
+
+impl Known {
+    /// The cells in `space`.
+    fn geometry(&mut self, space: InputSpace) -> Arc<TableGeometry> {
+        if let Some((_, known)) = self.geometries.iter().find(|(other, _)| *other == space) {
+            return Arc::clone(known);
+        }
+        let made = Arc::new(TableGeometry::new(space));
+        if self.geometries.len() == MOST_KEPT {
+            self.geometries.remove(0);
+        }
+        self.geometries.push((space, Arc::clone(&made)));
+        made
+    }
+
+    /// The functions of a lattice in `space`.
+    fn functions(&mut self, gp: &LatticeGp, space: InputSpace) -> Result<Arc<Functions>> {
+        if let Some(known) = self.functions.iter().find(|known| known.are_of(gp, space)) {
+            return Ok(Arc::clone(known));
+        }
+        let made = Arc::new(Functions::new(gp, space, &self.geometry(space))?);
+        if self.functions.len() == MOST_KEPT {
+            self.functions.remove(0);
+        }
+        self.functions.push(Arc::clone(&made));
+        Ok(made)
+    }
+}
+
 impl<'a> Prepared<'a> {
-    /// Prepares a model. The functions of lattices are tabulated here, which takes about a millisecond for 64 x 32 x 18
-    /// nodes; kernel sums are left to the bake.
+    /// Prepares a model. The functions of lattices are tabulated here; kernel sums are left to the bake.
     ///
     /// # Errors
     /// [`Error::NoShader`] for a model that no shader can evaluate.
     pub fn new(model: &'a Model) -> Result<Self> {
-        let mut geometries: Vec<(InputSpace, TableGeometry)> = Vec::new();
+        Self::with(model, &mut Known::default())
+    }
+
+    /// [`Prepared::new`] with what is known from before.
+    pub(super) fn with(model: &'a Model, known: &mut Known) -> Result<Self> {
+        let mut geometries: Vec<Arc<TableGeometry>> = Vec::new();
         let (mut parts, mut constants) = (Vec::new(), [0.0; 3]);
         for (first, posterior) in model.posteriors() {
             match posterior.device_form() {
@@ -45,14 +90,14 @@ impl<'a> Prepared<'a> {
                     for SeparablePart { gp, space, colour } in summands {
                         let placement = colour
                             .map_or(Placement::Channels { first }, |colour| Placement::Mixed { colour });
-                        let geometry = geometry_of(&mut geometries, space.into());
-                        let part = Separable::new(gp, geometry, placement)?;
-                        parts.push(Part::Separable(Box::new(part)));
+                        let functions = known.functions(gp, space.into())?;
+                        geometries.push(known.geometry(space.into()));
+                        parts.push(Part::Separable(Box::new(Separable::new(gp, functions, placement)?)));
                     }
                 }
                 DeviceForm::KernelSum(all) => {
                     for sum in all.sums {
-                        geometry_of(&mut geometries, sum.space);
+                        geometries.push(known.geometry(sum.space));
                         parts.push(Part::KernelSum(sum, first));
                     }
                     constants.iter_mut().zip(all.constants).for_each(|(sum, constant)| *sum += constant);
@@ -60,12 +105,9 @@ impl<'a> Prepared<'a> {
                 _ => return Err(Error::NoShader { what: format!("the {} solver", posterior.solver()) }),
             }
         }
-        if geometries.is_empty() {
-            geometry_of(&mut geometries, model.space());
-        }
-        let (_, geometry) = geometries.remove(0);
+        let geometry = geometries.first().map_or_else(|| known.geometry(model.space()), Arc::clone);
         let mut distinct = geometry.distinct().to_vec();
-        for (_, other) in &geometries {
+        for other in &geometries {
             distinct.iter_mut().zip(other.distinct()).for_each(|(least, &n)| *least = n.min(*least));
         }
         Ok(Self { model, parts, constants, geometry, distinct })
@@ -79,13 +121,4 @@ impl<'a> Prepared<'a> {
         };
         self.parts.iter().any(is_mixed)
     }
-}
-
-/// The cells in `space`, which are computed once for each space.
-fn geometry_of(known: &mut Vec<(InputSpace, TableGeometry)>, space: InputSpace) -> &TableGeometry {
-    let at = known.iter().position(|(other, _)| *other == space).unwrap_or_else(|| {
-        known.push((space, TableGeometry::new(space)));
-        known.len() - 1
-    });
-    &known[at].1
 }

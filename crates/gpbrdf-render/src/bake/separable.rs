@@ -1,7 +1,11 @@
 //! The bake of a process in its separable form.
 
+use std::sync::Arc;
+
 use gpbrdf_core::brdf::N_THETA_H;
 use gpbrdf_core::gp::{LatticeGp, SeparableForm, TableGeometry};
+use gpbrdf_core::kernel::Kernel1d;
+use gpbrdf_core::sample::InputSpace;
 use wgpu::BufferUsages;
 
 use super::axis_table::AxisTable;
@@ -16,13 +20,69 @@ const WHAT: &str = "bake: separable form";
 /// A process in its separable form as the shader reads it.
 #[derive(Debug)]
 pub(super) struct Separable {
+    functions: Arc<Functions>,
     uniform: gpu_types::Separable,
+    coefficients: Vec<[f32; 4]>,
+    pub(super) placement: Placement,
+}
+
+/// What the kernels of a lattice alone decide: the functions along its axes.
+#[derive(Debug)]
+pub(super) struct Functions {
+    space: InputSpace,
+    coordinates: [Vec<f64>; 3],
+    kernels: [Kernel1d; 3],
     tables: Vec<f32>,
     cubics: Vec<[f32; 4]>,
-    coefficients: Vec<[f32; 4]>,
     /// Functions along each axis.
     shape: [usize; 3],
-    pub(super) placement: Placement,
+    /// What the uniform of every process with these functions holds.
+    uniform: gpu_types::Separable,
+}
+
+impl Functions {
+    /// Whether a lattice in `space` has these functions.
+    pub(super) fn are_of(&self, gp: &LatticeGp, space: InputSpace) -> bool {
+        self.space == space && self.kernels == gp.hyper().kernels && self.coordinates == gp.data().coordinates
+    }
+
+    /// Tabulates the functions of every axis, those of `theta_h` and `phi_d` at the cells of `geometry`, those of
+    /// `theta_d` as piecewise cubics.
+    pub(super) fn new(gp: &LatticeGp, space: InputSpace, geometry: &TableGeometry) -> Result<Self> {
+        let form = &SeparableForm::new(gp)?;
+        let axis = AxisTable::new(form, &gp.data().coordinates[1]);
+        let mut tables = Tables::default();
+        let first = tables.push_basis(form, 0, geometry.first());
+        let third = tables.push_basis(form, 2, geometry.third());
+        let second = [
+            tables.push(geometry.second().iter().copied()),
+            tables.push(geometry.scale().iter().copied()),
+            tables.push(geometry.distinct().iter().map(|&n| n as f64)),
+            tables.push(axis.breaks.iter().map(|&x| f64::from(x))),
+        ];
+        let [a, b, c] = form.shape();
+        let uniform = gpu_types::Separable {
+            shape: [a, b, c, geometry.third().len()].map(to_u32),
+            first,
+            third,
+            second,
+            pieces: [to_u32(axis.breaks.len() - 1), to_u32(axis.pieces)],
+            signal_variance: 0.0,
+            second_prior: narrow(axis.prior),
+            limit: narrow(geometry.limit().min(f64::from(f32::MAX))),
+            padding: [0.0; 3],
+            share: [0.0; 4],
+        };
+        Ok(Self {
+            space,
+            coordinates: gp.data().coordinates.clone(),
+            kernels: gp.hyper().kernels.clone(),
+            tables: tables.0,
+            cubics: axis.cubics,
+            shape: [a, b, c],
+            uniform,
+        })
+    }
 }
 
 /// How the channels of a process contribute to those of the model.
@@ -71,7 +131,7 @@ impl Pipelines {
     /// of four components.
     pub(super) fn add(&self, context: &Context, process: &Separable, targets: &Targets<'_>) -> Result<()> {
         let operands = Operands::new(context, process)?;
-        let [_, b, c] = process.shape;
+        let [_, b, c] = process.functions.shape;
         let rows = targets.rows();
         let vectors =
             |label, count: usize| context.empty_buffer(label, 16 * count as u64, BufferUsages::STORAGE);
@@ -127,46 +187,26 @@ impl Operands {
         let buffer = |label, bytes| context.buffer_of(label, bytes, BufferUsages::STORAGE);
         Ok(Self {
             uniform: context.uniform(&process.uniform)?,
-            tables: buffer("bake: tables", bytemuck::cast_slice(&process.tables))?,
-            cubics: buffer("bake: cubics", bytemuck::cast_slice(&process.cubics))?,
+            tables: buffer("bake: tables", bytemuck::cast_slice(&process.functions.tables))?,
+            cubics: buffer("bake: cubics", bytemuck::cast_slice(&process.functions.cubics))?,
             coefficients: buffer("bake: coefficients", bytemuck::cast_slice(&process.coefficients))?,
         })
     }
 }
 
 impl Separable {
-    /// Tabulates the functions of every axis, those of `theta_h` and `phi_d` at the cells of `geometry`, those of
-    /// `theta_d` as piecewise cubics.
-    pub(super) fn new(gp: &LatticeGp, geometry: &TableGeometry, placement: Placement) -> Result<Self> {
-        let form = &SeparableForm::new(gp)?;
-        let axis = AxisTable::new(form, &gp.data().coordinates[1]);
-        let mut tables = Tables::default();
-        let first = tables.push_basis(form, 0, geometry.first());
-        let third = tables.push_basis(form, 2, geometry.third());
-        let second = [
-            tables.push(geometry.second().iter().copied()),
-            tables.push(geometry.scale().iter().copied()),
-            tables.push(geometry.distinct().iter().map(|&n| n as f64)),
-            tables.push(axis.breaks.iter().map(|&x| f64::from(x))),
-        ];
-        let [a, b, c] = form.shape();
+    /// A process whose functions are known.
+    pub(super) fn new(gp: &LatticeGp, functions: Arc<Functions>, placement: Placement) -> Result<Self> {
         let uniform = gpu_types::Separable {
-            shape: [a, b, c, geometry.third().len()].map(to_u32),
-            first,
-            third,
-            second,
-            pieces: [to_u32(axis.breaks.len() - 1), to_u32(axis.pieces)],
             signal_variance: narrow(gp.hyper().signal_variance),
-            second_prior: narrow(axis.prior),
-            limit: narrow(geometry.limit().min(f64::from(f32::MAX))),
-            padding: [0.0; 3],
             share: match placement {
                 Placement::Channels { .. } => [0.0; 4],
                 Placement::Mixed { colour: [r, g, b] } => [r * r, g * g, b * b, 0.0].map(narrow),
             },
+            ..functions.uniform
         };
-        let coefficients = coefficients(form, placement);
-        Ok(Self { uniform, tables: tables.0, cubics: axis.cubics, coefficients, shape: [a, b, c], placement })
+        let coefficients = coefficients(&SeparableForm::new(gp)?, placement);
+        Ok(Self { functions, uniform, coefficients, placement })
     }
 }
 
