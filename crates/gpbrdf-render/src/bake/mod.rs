@@ -90,7 +90,7 @@ impl Baker {
         self.bake_prepared(&self.prepare(model)?, texture, progress)
     }
 
-    /// [`Prepared::new`], which takes a tenth of the time for lattices whose kernels are those of a model that this
+    /// [`Prepared::new`], which computes no functions anew for lattices whose kernels are those of a model that this
     /// baker has prepared before.
     ///
     /// # Errors
