@@ -103,7 +103,7 @@ fn spawn(cli: &Cli, arguments: &[&str]) -> Child {
 fn moments(seed: u64, count: usize, length: Duration) -> impl Iterator<Item = Duration> {
     let mut random = SplitMix64::new(seed);
     (0..count).map(move |i| {
-        let share = (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+        let share = random.next_unit();
         length.mul_f64(if i % 2 == 0 { share } else { 0.7 + 0.35 * share })
     })
 }

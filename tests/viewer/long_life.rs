@@ -70,7 +70,7 @@ struct Dice(SplitMix64);
 
 impl Dice {
     fn share(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+        self.0.next_unit()
     }
 
     fn below(&mut self, bound: usize) -> usize {

@@ -68,6 +68,11 @@ pub struct Source {
     pub content: Content,
 }
 
+/// What a model says about itself.
+fn description_of(model: &Model) -> String {
+    format!("model of {}", model.provenance.source)
+}
+
 impl Source {
     /// Reads a file; its format is recognised by its content.
     ///
@@ -132,7 +137,7 @@ impl Source {
             Content::Samples(samples) => samples.description.clone(),
             Content::Model(model) => {
                 name.clone_from(&model.provenance.material);
-                format!("model of {}", model.provenance.source)
+                description_of(model)
             }
         };
         let mut source =
@@ -176,7 +181,7 @@ impl Source {
     pub fn of_model(model: Model) -> Self {
         Self {
             name: model.provenance.material.clone(),
-            description: format!("model of {}", model.provenance.source),
+            description: description_of(&model),
             kind: "model".to_owned(),
             path: None,
             sha256: String::new(),

@@ -3,9 +3,7 @@
 use super::composite::{AxisMetric, Kernel};
 #[cfg(feature = "fit")]
 use super::row_gradient::GradientScratch;
-#[cfg(not(feature = "fit"))]
-use super::rows::RowScratch;
-use super::rows::STRIP;
+use super::rows::{RowScratch, STRIP};
 use crate::base::simd::vectorized;
 
 /// Squared distances between all pairs of a few points, and work arrays.
@@ -68,15 +66,7 @@ impl Pairs {
     pub(crate) fn values(&mut self, kernel: &Kernel, out: &mut Vec<f64>) {
         out.resize(n_pairs(self.len), 0.0);
         for (start, out) in (0..).step_by(STRIP).zip(out.chunks_mut(STRIP)) {
-            let n = out.len();
-            #[cfg(feature = "fit")]
-            let row = &mut self.scratch.row;
-            #[cfg(not(feature = "fit"))]
-            let row = &mut self.scratch;
-            for (to, from) in row.d2.iter_mut().zip(&self.d2) {
-                to[..n].copy_from_slice(&from[start..start + n]);
-            }
-            kernel.values_at_distances(row, out);
+            kernel.values_at_distances(self.strip(start, out.len()), out);
         }
     }
 
@@ -84,12 +74,21 @@ impl Pairs {
     #[cfg(feature = "fit")]
     pub(crate) fn add_gradient(&mut self, kernel: &Kernel, weights: &[f64], gradient: &mut [f64]) {
         for (start, weights) in (0..).step_by(STRIP).zip(weights.chunks(STRIP)) {
-            let n = weights.len();
-            for (to, from) in self.scratch.row.d2.iter_mut().zip(&self.d2) {
-                to[..n].copy_from_slice(&from[start..start + n]);
-            }
+            self.strip(start, weights.len());
             kernel.add_gradient_at_distances(weights, &mut self.scratch, gradient);
         }
+    }
+
+    /// The work arrays of rows, with the distances of `n` pairs from `start` on.
+    fn strip(&mut self, start: usize, n: usize) -> &mut RowScratch {
+        #[cfg(feature = "fit")]
+        let row = &mut self.scratch.row;
+        #[cfg(not(feature = "fit"))]
+        let row = &mut self.scratch;
+        for (to, from) in row.d2.iter_mut().zip(&self.d2) {
+            to[..n].copy_from_slice(&from[start..start + n]);
+        }
+        row
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use gpbrdf_core::Model;
-use gpbrdf_core::gp::{DeviceForm, KernelSum, LatticeGp, SeparablePart, TableGeometry};
+use gpbrdf_core::gp::{DeviceForm, KernelSum, LatticeGp, SeparableForm, SeparablePart, TableGeometry};
 use gpbrdf_core::sample::InputSpace;
 
 use super::separable::{Functions, Placement, Separable};
@@ -50,25 +50,27 @@ impl Known {
             return Arc::clone(known);
         }
         let made = Arc::new(TableGeometry::new(space));
-        if self.geometries.len() == MOST_KEPT {
-            self.geometries.remove(0);
-        }
-        self.geometries.push((space, Arc::clone(&made)));
+        keep(&mut self.geometries, (space, Arc::clone(&made)));
         made
     }
 
     /// The functions of a lattice in `space`.
-    fn functions(&mut self, gp: &LatticeGp, space: InputSpace) -> Result<Arc<Functions>> {
+    fn functions(&mut self, gp: &LatticeGp, form: &SeparableForm<'_>, space: InputSpace) -> Arc<Functions> {
         if let Some(known) = self.functions.iter().find(|known| known.are_of(gp, space)) {
-            return Ok(Arc::clone(known));
+            return Arc::clone(known);
         }
-        let made = Arc::new(Functions::new(gp, space, &self.geometry(space))?);
-        if self.functions.len() == MOST_KEPT {
-            self.functions.remove(0);
-        }
-        self.functions.push(Arc::clone(&made));
-        Ok(made)
+        let made = Arc::new(Functions::new(gp, form, space, &self.geometry(space)));
+        keep(&mut self.functions, Arc::clone(&made));
+        made
     }
+}
+
+/// Adds to what is kept, in place of the oldest if there are too many.
+fn keep<T>(all: &mut Vec<T>, new: T) {
+    if all.len() == MOST_KEPT {
+        all.remove(0);
+    }
+    all.push(new);
 }
 
 impl<'a> Prepared<'a> {
@@ -90,9 +92,11 @@ impl<'a> Prepared<'a> {
                     for SeparablePart { gp, space, colour } in summands {
                         let placement = colour
                             .map_or(Placement::Channels { first }, |colour| Placement::Mixed { colour });
-                        let functions = known.functions(gp, space.into())?;
+                        let form = SeparableForm::new(gp)?;
+                        let functions = known.functions(gp, &form, space.into());
                         geometries.push(known.geometry(space.into()));
-                        parts.push(Part::Separable(Box::new(Separable::new(gp, functions, placement)?)));
+                        let part = Separable::new(gp, &form, functions, placement);
+                        parts.push(Part::Separable(Box::new(part)));
                     }
                 }
                 DeviceForm::KernelSum(all) => {

@@ -48,8 +48,12 @@ impl Functions {
 
     /// Tabulates the functions of every axis, those of `theta_h` and `phi_d` at the cells of `geometry`, those of
     /// `theta_d` as piecewise cubics.
-    pub(super) fn new(gp: &LatticeGp, space: InputSpace, geometry: &TableGeometry) -> Result<Self> {
-        let form = &SeparableForm::new(gp)?;
+    pub(super) fn new(
+        gp: &LatticeGp,
+        form: &SeparableForm<'_>,
+        space: InputSpace,
+        geometry: &TableGeometry,
+    ) -> Self {
         let axis = AxisTable::new(form, &gp.data().coordinates[1]);
         let mut tables = Tables::default();
         let first = tables.push_basis(form, 0, geometry.first());
@@ -73,7 +77,7 @@ impl Functions {
             padding: [0.0; 3],
             share: [0.0; 4],
         };
-        Ok(Self {
+        Self {
             space,
             coordinates: gp.data().coordinates.clone(),
             kernels: gp.hyper().kernels.clone(),
@@ -81,7 +85,7 @@ impl Functions {
             cubics: axis.cubics,
             shape: [a, b, c],
             uniform,
-        })
+        }
     }
 }
 
@@ -196,7 +200,12 @@ impl Operands {
 
 impl Separable {
     /// A process whose functions are known.
-    pub(super) fn new(gp: &LatticeGp, functions: Arc<Functions>, placement: Placement) -> Result<Self> {
+    pub(super) fn new(
+        gp: &LatticeGp,
+        form: &SeparableForm<'_>,
+        functions: Arc<Functions>,
+        placement: Placement,
+    ) -> Self {
         let uniform = gpu_types::Separable {
             signal_variance: narrow(gp.hyper().signal_variance),
             share: match placement {
@@ -205,8 +214,7 @@ impl Separable {
             },
             ..functions.uniform
         };
-        let coefficients = coefficients(&SeparableForm::new(gp)?, placement);
-        Ok(Self { functions, uniform, coefficients, placement })
+        Self { functions, uniform, coefficients: coefficients(form, placement), placement }
     }
 }
 

@@ -11,6 +11,7 @@ use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
+use crate::gp::scattered::cost::EVALUATIONS;
 use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
 use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
@@ -20,9 +21,6 @@ const BRIGHTNESS: f64 = 0.5;
 
 /// The least effective number of materials that shape an adapted prior.
 const FEWEST_MATERIALS: f64 = 20.0;
-
-/// Evaluations of the likelihood that the searches of both kinds of colour usually take.
-const EVALUATIONS: usize = 110;
 
 /// The largest number of samples with which materials are compared.
 const MOST_COMPARED: usize = 512;

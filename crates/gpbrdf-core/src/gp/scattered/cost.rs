@@ -24,7 +24,7 @@ const BYTES: f64 = 8.0 * (2.0 * 200.0 + 1.5 * 48.0 + 9.0 * (5.0 + 16.0));
 const SEARCH: f64 = 6e8;
 
 /// Evaluations of the likelihood that a search usually takes, both spaces and all renewed weights together.
-pub(super) const EVALUATIONS: usize = 110;
+pub(crate) const EVALUATIONS: usize = 110;
 
 /// The share of the time of a fit that its search takes.
 pub(super) fn search_share(samples: usize) -> f64 {
