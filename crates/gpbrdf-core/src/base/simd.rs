@@ -18,6 +18,21 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 const LN_2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
+/// 1.5 * 2^23: what [`ROUND`] is in single precision.
+const ROUND_F32: f32 = 12_582_912.0;
+
+/// The cell of a position in `[0, last + 1]`, one of `0..=last`, and how far into it the position is. A position on the
+/// border of two cells may belong to either. NaN belongs to the last one.
+///
+/// A cast of a floating-point number to an integer saturates, which keeps a loop from vector instructions; this is an
+/// addition and a look at the low bits.
+#[inline(always)]
+pub(crate) fn cell(position: f32, last: u32) -> (u32, f32) {
+    let shifted = (position - 0.5) + ROUND_F32;
+    let index = shifted.to_bits().wrapping_sub(ROUND_F32.to_bits()).min(last);
+    (index, position - index.cast_signed() as f32)
+}
+
 /// `2^n` for an integer `n` in -1022..=1023.
 #[inline(always)]
 fn exp2_integer(n: f64) -> f64 {
@@ -301,6 +316,20 @@ mod tests {
         }
         assert_eq!(exp_negative(0.0), 1.0);
         assert!(exp_negative(f64::NAN).is_nan() && exp_negative(f64::from_bits(u64::MAX)).is_nan());
+    }
+
+    #[test]
+    fn cells_hold_their_positions() {
+        for i in 0..=7 * 64u16 {
+            let position = f32::from(i) / 64.0;
+            let (index, along) = cell(position, 6);
+            assert!(index <= 6 && (0.0..=1.0).contains(&along), "{position}: {index} {along}");
+            assert_eq!(index as f32 + along, position);
+        }
+        for position in [f32::NAN, f32::INFINITY, 8.0] {
+            assert_eq!(cell(position, 6).0, 6);
+        }
+        assert_eq!(cell(f32::MIN_POSITIVE, 6), (0, f32::MIN_POSITIVE));
     }
 
     #[test]

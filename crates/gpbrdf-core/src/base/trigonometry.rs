@@ -79,9 +79,9 @@ pub(crate) fn atan2_upper(y: f32, x: f32) -> f32 {
     for c in &ARCTANGENT_F32[1..] {
         poly = (poly + c) * s;
     }
-    let octant = t + t * poly;
-    let quadrant = if y > ax { FRAC_PI_2 - octant } else { octant };
-    if x < 0.0 { PI - quadrant } else { quadrant }
+    // Differences from one of two constants need no branch in loops without vector instructions, either.
+    let quadrant = ((if y > ax { FRAC_PI_2 } else { 0.0 }) - (t + t * poly)).abs();
+    ((if x < 0.0 { PI } else { 0.0 }) - quadrant).abs()
 }
 
 /// `acos(x)` for `x` in `[-1, 1]`, with an error of at most 5e-7, two units in the last place of `pi`.
@@ -92,8 +92,7 @@ pub(crate) fn acos(x: f32) -> f32 {
     for c in &ARCCOSINE[1..] {
         poly = poly * a + c;
     }
-    let quadrant = (1.0 - a).sqrt() * poly;
-    if x < 0.0 { PI - quadrant } else { quadrant }
+    ((if x < 0.0 { PI } else { 0.0 }) - (1.0 - a).sqrt() * poly).abs()
 }
 
 /// `(sin(x), cos(x))` for `x` in `[0, pi]`, with an error of at most 3e-7.

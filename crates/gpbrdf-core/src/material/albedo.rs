@@ -7,7 +7,7 @@ use crate::material::density::{
     COLUMNS, DirectionDensities, ROWS, VIEWS, column_node, row_node, view_between, view_cosine,
 };
 use crate::material::half_vector::HalfVectorSquare;
-use crate::material::lookup::{interpolate, positions};
+use crate::material::lookup::{Cells, interpolate};
 
 /// Number of elevations at which albedos are held.
 pub const ALBEDO_VIEWS: usize = 128;
@@ -58,7 +58,7 @@ impl Reflected {
     #[inline]
     pub(crate) fn albedo(&self, cosine: f32) -> [f32; 3] {
         let (k, t) = view_between(cosine, ALBEDO_VIEWS);
-        let (a, b) = (self.albedos[k], self.albedos[k + 1]);
+        let (a, b) = (self.albedos[k as usize], self.albedos[k as usize + 1]);
         std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
     }
 
@@ -75,7 +75,8 @@ impl Reflected {
 #[inline]
 fn factor_at(factors: &[f32], cosine: f32) -> f32 {
     let (k, t) = view_between(cosine, ALBEDO_VIEWS);
-    factors[k] + (factors[k + 1] - factors[k]) * t
+    let (a, b) = (factors[k as usize], factors[k as usize + 1]);
+    a + (b - a) * t
 }
 
 /// The sum of a row of the transport, each elevation with its factor.
@@ -133,7 +134,7 @@ fn from_elevation(values: &[[f32; 3]], k: usize) -> Vec<[f64; 3]> {
                 let weight = f64::from(0.5 * width * cosine / (columns as f32 * per_steradian));
                 let (m, t) = view_between(cosine, ALBEDO_VIEWS);
                 for (m, share) in [(m, 1.0 - f64::from(t)), (m + 1, f64::from(t))] {
-                    (0..3).for_each(|c| sums[m][c] += share * weight * f64::from(f[c]));
+                    (0..3).for_each(|c| sums[m as usize][c] += share * weight * f64::from(f[c]));
                 }
             }
         }
@@ -155,8 +156,8 @@ fn reflected(
     if !(wi[2] > 0.0) {
         return None;
     }
-    let [[h], [d], [p]] = positions(&wi.map(|x| [x]), &wo.map(|x| [x]));
-    Some((interpolate(values, h, d, p), wi[2], per_steradian))
+    let [f] = interpolate(values, &Cells::new(&wi.map(|x| [x]), &wo.map(|x| [x])));
+    Some((f, wi[2], per_steradian))
 }
 
 /// The outgoing direction with this cosine, above the x axis.
@@ -183,8 +184,9 @@ fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<
         let (along, across) = (point / ((COLUMNS - 1) * CELL_POINTS), point % ((COLUMNS - 1) * CELL_POINTS));
         let (j, x) = (along / CELL_POINTS, within(along % CELL_POINTS));
         let (i, b) = (across / CELL_POINTS, within(across % CELL_POINTS));
-        let row = row_node(j) + (row_node(j + 1) - row_node(j)) * x;
-        let column = column_node(i) + (column_node(i + 1) - column_node(i)) * b;
+        let between = |start: f32, end: f32, along: f32| start + (end - start) * along;
+        let row = between(row_node(j as u32), row_node(j as u32 + 1), x);
+        let column = between(column_node(i as u32), column_node(i as u32 + 1), b);
         let mut value = 0.0;
         for side in [-1.0, 1.0] {
             if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {

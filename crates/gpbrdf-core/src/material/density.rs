@@ -1,4 +1,9 @@
 //! Densities on the unit square, one for each of several outgoing directions, that are evaluated and sampled exactly.
+//!
+//! Points are evaluated and drawn `N` at a time, in loops that do either arithmetic or reading, but not both: the former
+//! become vector instructions, and the latter do not wait for each other.
+
+use crate::base::simd::cell;
 
 /// Number of elevations of the outgoing direction.
 pub const VIEWS: usize = 64;
@@ -21,23 +26,23 @@ pub struct DirectionDensities {
     marginal: Vec<f32>,
 }
 
-/// One or two elevations and the weight of the second.
+/// The two elevations about each of `N` outgoing directions.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    first: usize,
-    second_weight: f32,
+pub(crate) struct Views<const N: usize> {
+    first: [u32; N],
+    second_weight: [f32; N],
 }
 
-/// The cell that holds a position of `[0, nodes - 1]`, and how far into it the position is.
-#[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a position is small and not negative"
-)]
-fn cell(position: f32, nodes: usize) -> (usize, f32) {
-    let low = (position as u32 as usize).min(nodes - 2);
-    (low, (position - low as f32).clamp(0.0, 1.0))
+impl<const N: usize> Views<N> {
+    /// The elevations about these cosines of `theta_o`.
+    #[inline(always)]
+    pub(crate) fn new(cosines: &[f32; N]) -> Self {
+        let mut out = Self { first: [0; N], second_weight: [0.0; N] };
+        for k in 0..N {
+            (out.first[k], out.second_weight[k]) = view_between(cosines[k], VIEWS);
+        }
+        out
+    }
 }
 
 /// Position of an elevation among `nodes` of them that are placed like those of [`DirectionDensities`], from the cosine
@@ -60,19 +65,21 @@ pub(crate) fn view_cosine(index: usize, nodes: usize) -> f32 {
 
 /// The elevations about a cosine of `theta_o`, among `nodes`: the first, and the weight of the one after it.
 #[inline(always)]
-pub(crate) fn view_between(cosine: f32, nodes: usize) -> (usize, f32) {
-    cell(view_position(cosine, nodes), nodes)
+pub(crate) fn view_between(cosine: f32, nodes: usize) -> (u32, f32) {
+    cell(view_position(cosine, nodes), nodes as u32 - 2)
 }
 
 /// Position of a row node.
-pub(crate) fn row_node(j: usize) -> f32 {
-    let t = j as f32 / (ROWS - 1) as f32;
+#[inline(always)]
+pub(crate) fn row_node(j: u32) -> f32 {
+    let t = j.cast_signed() as f32 / (ROWS - 1) as f32;
     (t * t) * (t * t)
 }
 
 /// Position of a column node.
-pub(crate) fn column_node(i: usize) -> f32 {
-    let t = 1.0 - i as f32 / (COLUMNS - 1) as f32;
+#[inline(always)]
+pub(crate) fn column_node(i: u32) -> f32 {
+    let t = 1.0 - i.cast_signed() as f32 / (COLUMNS - 1) as f32;
     1.0 - t * t
 }
 
@@ -83,15 +90,16 @@ fn invert_linear(a: f32, b: f32, mass: f32) -> f32 {
     (2.0 * mass / (a + root).max(f32::MIN_POSITIVE)).min(1.0)
 }
 
-/// The last index of `0..count` whose running sum is at most `target`; 0 where none is.
+/// The last interval between `M` running sums whose first sum is at most `target`; the first one
+/// where none is.
+///
+/// All sums are compared, with eight of them or more in one instruction: a binary search does fewer comparisons, but the
+/// processor guesses half of them wrong. The comparison is the sign bit of a difference, which can be added up where the
+/// result of a comparison is taken apart bit by bit.
 #[inline(always)]
-fn search(count: usize, target: f32, sum: impl Fn(usize) -> f32) -> usize {
-    let (mut low, mut high) = (0, count);
-    while high - low > 1 {
-        let middle = usize::midpoint(low, high);
-        if sum(middle) <= target { low = middle } else { high = middle }
-    }
-    low
+fn search<const M: usize>(sums: &[f32; M], target: f32) -> u32 {
+    let above: u32 = sums.iter().map(|sum| (target - sum).to_bits() >> 31).sum();
+    (M as u32 - above).saturating_sub(1).min(M as u32 - 2)
 }
 
 const SQUARE: usize = ROWS * COLUMNS;
@@ -137,72 +145,118 @@ impl DirectionDensities {
         &self.marginal
     }
 
-    /// The mixture at an outgoing direction with this cosine.
+    /// The densities of the mixtures at points of the square.
     #[inline(always)]
-    pub(crate) fn view(cosine: f32) -> View {
-        let (first, second_weight) = view_between(cosine, VIEWS);
-        View { first, second_weight }
+    pub(crate) fn at<const N: usize>(
+        &self,
+        views: &Views<N>,
+        rows: &[f32; N],
+        columns: &[f32; N],
+    ) -> [f32; N] {
+        let (mut starts, mut along_row, mut along_column) = ([0; N], [0.0; N], [0.0; N]);
+        for k in 0..N {
+            let (j, x) = row_cell(rows[k]);
+            let (i, b) = column_cell(columns[k]);
+            starts[k] = (views.first[k] * ROWS as u32 + j) * COLUMNS as u32 + i;
+            (along_row[k], along_column[k]) = (x, b);
+        }
+        let mut corners = [[0.0; N]; 8];
+        for k in 0..N {
+            let start = starts[k] as usize;
+            let near = &self.values[start..start + SQUARE + COLUMNS + 2];
+            let offsets = [0, 1, COLUMNS, COLUMNS + 1];
+            for (corner, offset) in offsets.into_iter().chain(offsets.map(|o| SQUARE + o)).enumerate() {
+                corners[corner][k] = near[offset];
+            }
+        }
+        let mut out = [0.0; N];
+        for k in 0..N {
+            let of = |first: usize| {
+                let [a, b, c, d] = [0, 1, 2, 3].map(|corner| corners[first + corner][k]);
+                let (low, high) = (a + (b - a) * along_column[k], c + (d - c) * along_column[k]);
+                low + (high - low) * along_row[k]
+            };
+            let (first, second) = (of(0), of(4));
+            out[k] = first + (second - first) * views.second_weight[k];
+        }
+        out
     }
 
-    /// The density at a point of the square.
+    /// The rows and the columns of points drawn from the mixtures by two numbers each that are uniform on `[0, 1)`. The
+    /// first one also chooses the elevation.
     #[inline(always)]
-    pub(crate) fn at(&self, view: View, row: f32, column: f32) -> f32 {
-        let (j, x) = row_cell(row);
-        let (i, b) = column_cell(column);
-        let of = |k: usize| {
-            let start = (k * ROWS + j) * COLUMNS + i;
-            let square = &self.values[start..start + COLUMNS + 2];
-            let low = square[0] + (square[1] - square[0]) * b;
-            let high = square[COLUMNS] + (square[COLUMNS + 1] - square[COLUMNS]) * b;
-            low + (high - low) * x
-        };
-        let first = of(view.first);
-        first + (of(view.first + 1) - first) * view.second_weight
-    }
-
-    /// A point `(row, column)` drawn from the mixture by two numbers that are uniform on `[0, 1)`. The first one also
-    /// chooses the elevation.
-    #[inline(always)]
-    pub(crate) fn draw(&self, view: View, u: f32, v: f32) -> (f32, f32) {
-        let weight = view.second_weight;
-        let (k, u) = if u < weight {
-            (view.first + 1, u / weight)
-        } else {
-            (view.first, (u - weight) / (1.0 - weight).max(f32::MIN_POSITIVE))
-        };
-        let marginal = &self.marginal[k * ROWS..(k + 1) * ROWS];
-        let values = &self.values[k * SQUARE..(k + 1) * SQUARE];
-        let conditional = &self.conditional[k * SQUARE..(k + 1) * SQUARE];
-        let target = u * marginal[ROWS - 1];
-        let j = search(ROWS - 1, target, |j| marginal[j]);
-        let (low, high) = (j * COLUMNS, (j + 1) * COLUMNS);
-        let (bottom, top) = (row_node(j), row_node(j + 1));
-        let (density_low, density_high) = (conditional[high - 1], conditional[high + COLUMNS - 1]);
-        let x = invert_linear(density_low, density_high, (target - marginal[j]) / (top - bottom));
-        let between = |a: f32, b: f32| a + (b - a) * x;
-        let target = v * between(density_low, density_high);
-        let below = |i: usize| between(conditional[low + i], conditional[high + i]);
-        let i = search(COLUMNS - 1, target, below);
-        let left = between(values[low + i], values[high + i]);
-        let right = between(values[low + i + 1], values[high + i + 1]);
-        let (start, end) = (column_node(i), column_node(i + 1));
-        let along = invert_linear(left, right, (target - below(i)) / (end - start));
-        (bottom + (top - bottom) * x, start + (end - start) * along)
+    pub(crate) fn draw<const N: usize>(
+        &self,
+        views: &Views<N>,
+        u: &[f32; N],
+        v: &[f32; N],
+    ) -> ([f32; N], [f32; N]) {
+        let (mut squares, mut share) = ([0; N], [0.0; N]);
+        for k in 0..N {
+            let weight = views.second_weight[k];
+            let (second, rest) = (u[k] < weight, (u[k] - weight) / (1.0 - weight).max(f32::MIN_POSITIVE));
+            squares[k] = views.first[k] + u32::from(second);
+            share[k] = if second { u[k] / weight } else { rest };
+        }
+        let marginals = self.marginal.as_chunks::<ROWS>().0;
+        let values = self.values.as_chunks::<COLUMNS>().0;
+        let conditionals = self.conditional.as_chunks::<COLUMNS>().0;
+        // The cell of rows, the mass from its start, and the densities of rows at its start and end.
+        let (mut j, mut mass, mut ends) = ([0; N], [0.0; N], [[0.0; N]; 2]);
+        for k in 0..N {
+            let marginal = &marginals[squares[k] as usize];
+            let target = share[k] * marginal[ROWS - 1];
+            j[k] = search(marginal, target);
+            mass[k] = target - marginal[j[k] as usize];
+            let row = squares[k] as usize * ROWS + j[k] as usize;
+            (ends[0][k], ends[1][k]) = (conditionals[row][COLUMNS - 1], conditionals[row + 1][COLUMNS - 1]);
+        }
+        let (mut rows, mut along, mut targets) = ([0.0; N], [0.0; N], [0.0; N]);
+        for k in 0..N {
+            let (bottom, height) = (row_node(j[k]), row_node(j[k] + 1) - row_node(j[k]));
+            along[k] = invert_linear(ends[0][k], ends[1][k], mass[k] / height);
+            rows[k] = bottom + height * along[k];
+            targets[k] = v[k] * (ends[0][k] + (ends[1][k] - ends[0][k]) * along[k]);
+        }
+        // The cell of columns, the mass from its start, and the densities at its start and end.
+        let mut i = [0; N];
+        for k in 0..N {
+            let row = squares[k] as usize * ROWS + j[k] as usize;
+            let (low, high) = (&conditionals[row], &conditionals[row + 1]);
+            let mut sums = [0.0; COLUMNS];
+            for i in 0..COLUMNS {
+                sums[i] = low[i] + (high[i] - low[i]) * along[k];
+            }
+            i[k] = search(&sums, targets[k]);
+            let first = i[k] as usize;
+            mass[k] = targets[k] - sums[first];
+            let (low, high) = (&values[row], &values[row + 1]);
+            for end in 0..2 {
+                let (low, high) = (low[first + end], high[first + end]);
+                ends[end][k] = low + (high - low) * along[k];
+            }
+        }
+        let mut columns = [0.0; N];
+        for k in 0..N {
+            let (start, width) = (column_node(i[k]), column_node(i[k] + 1) - column_node(i[k]));
+            columns[k] = start + width * invert_linear(ends[0][k], ends[1][k], mass[k] / width);
+        }
+        (rows, columns)
     }
 }
 
 /// The cell of rows that holds a row coordinate, and how far into it that is.
 #[inline(always)]
-fn row_cell(row: f32) -> (usize, f32) {
-    let (j, _) = cell(row.sqrt().sqrt() * (ROWS - 1) as f32, ROWS);
+fn row_cell(row: f32) -> (u32, f32) {
+    let (j, _) = cell(row.sqrt().sqrt() * (ROWS - 1) as f32, ROWS as u32 - 2);
     let (low, high) = (row_node(j), row_node(j + 1));
     (j, ((row - low) / (high - low)).clamp(0.0, 1.0))
 }
 
 /// The cell of columns that holds a column coordinate, and how far into it that is.
 #[inline(always)]
-fn column_cell(column: f32) -> (usize, f32) {
-    let (i, _) = cell((1.0 - (1.0 - column).sqrt()) * (COLUMNS - 1) as f32, COLUMNS);
+fn column_cell(column: f32) -> (u32, f32) {
+    let (i, _) = cell((1.0 - (1.0 - column).sqrt()) * (COLUMNS - 1) as f32, COLUMNS as u32 - 2);
     let (start, end) = (column_node(i), column_node(i + 1));
     (i, ((column - start) / (end - start)).clamp(0.0, 1.0))
 }
@@ -213,7 +267,7 @@ fn sums(values: &[f32], conditional: &mut [f32], marginal: &mut [f32]) -> f32 {
         let mut sum = 0.0;
         conditional[0] = 0.0;
         for i in 1..COLUMNS {
-            let width = f64::from(column_node(i) - column_node(i - 1));
+            let width = f64::from(column_node(i as u32) - column_node(i as u32 - 1));
             sum += 0.5 * width * (f64::from(values[i - 1]) + f64::from(values[i]));
             conditional[i] = narrow(sum);
         }
@@ -222,7 +276,8 @@ fn sums(values: &[f32], conditional: &mut [f32], marginal: &mut [f32]) -> f32 {
     let mut sum = 0.0;
     marginal[0] = 0.0;
     for j in 1..ROWS {
-        sum += 0.5 * f64::from(row_node(j) - row_node(j - 1)) * (density(j - 1) + density(j));
+        let height = f64::from(row_node(j as u32) - row_node(j as u32 - 1));
+        sum += 0.5 * height * (density(j - 1) + density(j));
         marginal[j] = narrow(sum);
     }
     narrow(sum)
