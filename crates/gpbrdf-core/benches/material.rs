@@ -1,5 +1,6 @@
 //! Benchmark of a material on one core: evaluation at random pairs of directions, sampling, density, and beside them a
-//! reader that takes the nearest cell of the table, in double precision, as the first programs for MERL tables do.
+//! reader that takes the nearest cell of the table, in double precision, as the first programs for MERL tables do, and
+//! what reading the cells about each pair costs when their places are known.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -8,7 +9,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gpbrdf_core::base::SplitMix64;
 use gpbrdf_core::brdf::{Reciprocal, cell_index, material};
-use gpbrdf_core::{Brdf, BrdfTable, Material, MaterialOptions};
+use gpbrdf_core::{Brdf, BrdfTable, HalfDiff, Material, MaterialOptions};
 
 /// Pairs of directions of one measurement: their cells do not fit the smaller caches.
 const PAIRS: usize = 1 << 16;
@@ -35,6 +36,25 @@ fn nearest_cell(table: &BrdfTable, wi: [f32; 3], wo: [f32; 3]) -> [f32; 3] {
         index(theta_d / FRAC_PI_2, 90),
         index(phi_d / PI, 180),
     )]
+}
+
+/// Where the two cells along `phi_d` about a pair begin in the table, at the two nearest values of `theta_h` and of
+/// `theta_d`.
+fn rows_about(wi: [f32; 3], wo: [f32; 3]) -> [usize; 4] {
+    let wide = |w: [f32; 3]| gpbrdf_core::nalgebra::Vector3::from(w.map(f64::from));
+    let angles = HalfDiff::from_directions(&wide(wi), &wide(wo));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "fractions are not negative")]
+    let index = |t: f64, n: usize| ((t * n as f64 - 0.5).max(0.0) as usize).min(n - 2);
+    let h = index((angles.theta_h / FRAC_PI_2).sqrt(), 90);
+    let (d, p) = (index(angles.theta_d / FRAC_PI_2, 90), index(angles.phi_d / PI, 180));
+    [(h, d), (h, d + 1), (h + 1, d), (h + 1, d + 1)].map(|(h, d)| 3 * cell_index(h, d, p))
+}
+
+/// The sum of eight cells, a channel at a time.
+fn sum_of_cells(values: &[f32], rows: [usize; 4]) -> [f32; 3] {
+    let [a, b, c, d] = rows.map(|start| &values[start..start + 6]);
+    let sums: [f32; 6] = std::array::from_fn(|i| (a[i] + b[i]) + (c[i] + d[i]));
+    std::array::from_fn(|c| sums[c] + sums[c + 3])
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "materials are in single precision")]
@@ -70,6 +90,15 @@ fn bench(c: &mut Criterion) {
         b.iter(|| {
             for ((out, &wi), &wo) in values.iter_mut().zip(black_box(&wi)).zip(&wo) {
                 *out = nearest_cell(material.table(), wi, wo);
+            }
+        });
+    });
+    let rows: Vec<_> = wi.iter().zip(&wo).map(|(&wi, &wo)| rows_about(wi, wo)).collect();
+    let table = material.table().values().as_flattened();
+    group.bench_function("reading_alone", |b| {
+        b.iter(|| {
+            for (out, &rows) in values.iter_mut().zip(black_box(&rows)) {
+                *out = sum_of_cells(table, rows);
             }
         });
     });

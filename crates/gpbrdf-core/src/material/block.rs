@@ -1,7 +1,7 @@
 //! Evaluation, sampling and density of `N` pairs of directions at a time: one for a single call, [`LANES`] for many.
 //!
-//! Loops over the lanes of a block become vector instructions where they are compiled for a processor that has them, and
-//! round like single calls.
+//! Loops over the lanes of a block become vector instructions where they are compiled for a processor that has them,
+//! and round like single calls.
 
 use super::density::Views;
 use super::half_vector::HalfVectorSquare;

@@ -1,7 +1,7 @@
 //! Densities on the unit square, one for each of several outgoing directions, that are evaluated and sampled exactly.
 //!
-//! Points are evaluated and drawn `N` at a time, in loops that do either arithmetic or reading, but not both: the former
-//! become vector instructions, and the latter do not wait for each other.
+//! Points are evaluated and drawn `N` at a time, in loops that do either arithmetic or reading, but not both: the
+//! former become vector instructions, and the latter do not wait for each other.
 
 use crate::base::simd::cell;
 
@@ -93,9 +93,9 @@ fn invert_linear(a: f32, b: f32, mass: f32) -> f32 {
 /// The last interval between `M` running sums whose first sum is at most `target`; the first one
 /// where none is.
 ///
-/// All sums are compared, with eight of them or more in one instruction: a binary search does fewer comparisons, but the
-/// processor guesses half of them wrong. The comparison is the sign bit of a difference, which can be added up where the
-/// result of a comparison is taken apart bit by bit.
+/// All sums are compared, several of them in one instruction: a binary search does fewer comparisons, but the
+/// processor guesses half of them wrong. The comparison is the sign bit of a difference, which can be added up; the
+/// result of a comparison would be taken apart bit by bit.
 #[inline(always)]
 fn search<const M: usize>(sums: &[f32; M], target: f32) -> u32 {
     let above: u32 = sums.iter().map(|sum| (target - sum).to_bits() >> 31).sum();
@@ -286,4 +286,48 @@ fn sums(values: &[f32], conditional: &mut [f32], marginal: &mut [f32]) -> f32 {
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the densities")]
 fn narrow(x: f64) -> f32 {
     x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_hold_their_targets() {
+        // Nothing is drawn from the flat parts: of equal sums, the last one starts the interval.
+        let sums: [f32; 24] = std::array::from_fn(|i| (i / 3 * 3) as f32);
+        for i in 0..=4 * 21u16 {
+            let target = f32::from(i) / 4.0;
+            let found = search(&sums, target) as usize;
+            let expected = sums.iter().rposition(|sum| *sum <= target).map_or(0, |last| last.min(22));
+            assert_eq!(found, expected, "{target}");
+        }
+        assert_eq!((search(&sums, -1.0), search(&sums, 99.0)), (0, 22));
+        assert!(search(&sums, f32::NAN) <= 22);
+    }
+
+    #[test]
+    fn points_are_drawn_where_the_density_is() {
+        // A random density at every node, so that all cells and both elevations differ.
+        let mut random = crate::base::SplitMix64::new(4);
+        let values = (0..VIEWS * SQUARE).map(|_| narrow(0.2 + random.next_unit())).collect();
+        let densities = DirectionDensities::new(values);
+        let views = Views::new(&[0.37; 64]);
+        let mut areas = [[0.0; 8]; 8];
+        let rounds = 2000;
+        for _ in 0..rounds {
+            let [u, v] = [(); 2].map(|()| std::array::from_fn(|_| narrow(random.next_unit())));
+            let (rows, columns) = densities.draw(&views, &u, &v);
+            let found = densities.at(&views, &rows, &columns);
+            for k in 0..64 {
+                let [j, i] = [rows[k], columns[k]].map(|x| cell(8.0 * x, 7).0 as usize);
+                areas[j][i] += 1.0 / f64::from(found[k]);
+            }
+        }
+        // The mean of 1 / density over the draws that fall into a part of the square is the area of that part.
+        for area in areas.as_flattened() {
+            let area = area / f64::from(64 * rounds);
+            assert!((64.0 * area - 1.0).abs() < 0.12, "{area}");
+        }
+    }
 }

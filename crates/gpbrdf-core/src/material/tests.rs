@@ -51,6 +51,28 @@ fn values_are_those_of_the_table_in_double_precision() {
 }
 
 #[test]
+fn the_right_cells_are_read() {
+    // Neighbours of a random table have nothing in common.
+    let mut random = crate::base::SplitMix64::new(7);
+    #[expect(clippy::cast_possible_truncation, reason = "tables are in single precision")]
+    let values =
+        (0..crate::brdf::N_CELLS).map(|_| [0.0; 3].map(|_: f32| random.next_unit() as f32)).collect();
+    let material = made(BrdfTable::from_values(values).unwrap());
+    // Every column, where the last pair of columns joins the last one to the first, and the outermost rows.
+    let corners = [[1e-4, 0.0], [0.3, 0.7], [0.02, 1.568]];
+    let angles = (0..7200).map(|i| (PI * (f64::from(i) + 0.3) / 7200.0, corners[(i % 3) as usize]));
+    for (phi_d, [theta_h, theta_d]) in angles {
+        let (wi, wo) = HalfDiff { theta_h, theta_d, phi_d }.to_directions();
+        let (wi, wo) = (narrow(wi), narrow(wo));
+        let wide = |w: [f32; 3]| nalgebra::Vector3::from(w.map(f64::from));
+        let (found, exact) = (material.eval(wi, wo), material.table().eval(&wide(wi), &wide(wo)));
+        for (found, exact) in found.iter().zip(exact) {
+            assert!((f64::from(*found) - exact).abs() < 3e-3, "{theta_h} {theta_d} {phi_d}: {found} {exact}");
+        }
+    }
+}
+
+#[test]
 fn values_are_reciprocal_and_zero_below_the_horizon() {
     let material = made(table_of("cherry-235"));
     for [wi, wo] in pairs(5_000) {
@@ -65,6 +87,12 @@ fn values_are_reciprocal_and_zero_below_the_horizon() {
         assert_eq!((material.pdf(bad, up), material.pdf(up, bad)), (0.0, 0.0));
         assert_eq!((material.sample(bad, 0.5, 0.5), material.albedo(bad)), (None, [0.0; 3]));
     }
+    // Nothing is promised of these but that they are taken.
+    for odd in [[f32::NAN, 0.0, 1.0], [f32::INFINITY; 3], [1e30, -1e30, 1e30], [0.0, 0.0, 1e-30]] {
+        assert!(material.eval(odd, side).iter().all(|f| !(*f < 0.0)));
+        assert!(!(material.pdf(odd, side) < 0.0) && !(material.pdf(side, odd) < 0.0));
+        assert!(material.sample(odd, 0.5, 0.5).is_none_or(|drawn| !(drawn.pdf < 0.0)));
+    }
     for u in [-1.0, 0.0, 0.1, 0.999_999_9, 1.0, 7.0, f32::NAN, f32::INFINITY] {
         for wo in [up, side, narrow(direction(FRAC_PI_2 - 1e-6, 1.0))] {
             let Some(drawn) = material.sample(wo, u, u) else { continue };
@@ -77,7 +105,11 @@ fn values_are_reciprocal_and_zero_below_the_horizon() {
 #[test]
 fn many_are_evaluated_like_one() {
     let material = made(table_of("red-plastic"));
-    let (wi, wo): (Vec<_>, Vec<_>) = pairs(1_003).map(|[wi, wo]| (narrow(wi), narrow(wo))).unzip();
+    let (mut wi, mut wo): (Vec<_>, Vec<_>) = pairs(1_003).map(|[wi, wo]| (narrow(wi), narrow(wo))).unzip();
+    // Some of a block are not above the horizon.
+    for (k, bad) in [[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [f32::NAN; 3]].into_iter().enumerate() {
+        (wi[70 + k], wo[80 + k]) = (bad, bad);
+    }
     let mut values = vec![[0.0; 3]; wi.len()];
     material.eval_many(&wi, &wo, &mut values);
     let mut densities = vec![0.0; wi.len()];
