@@ -38,22 +38,24 @@ fn nearest_cell(table: &BrdfTable, wi: [f32; 3], wo: [f32; 3]) -> [f32; 3] {
     )]
 }
 
-/// Where the two cells along `phi_d` about a pair begin in the table, at the two nearest values of `theta_h` and of
-/// `theta_d`.
-fn rows_about(wi: [f32; 3], wo: [f32; 3]) -> [usize; 4] {
+/// Numbers between neighbours along `theta_d` and along `theta_h`.
+const STRIDES: [usize; 2] = [3 * 180, 3 * 180 * 90];
+
+/// Where the first of the eight cells about a pair begins in the table.
+fn first_cell(wi: [f32; 3], wo: [f32; 3]) -> usize {
     let wide = |w: [f32; 3]| gpbrdf_core::nalgebra::Vector3::from(w.map(f64::from));
     let angles = HalfDiff::from_directions(&wide(wi), &wide(wo));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "fractions are not negative")]
-    let index = |t: f64, n: usize| ((t * n as f64 - 0.5).max(0.0) as usize).min(n - 2);
-    let h = index((angles.theta_h / FRAC_PI_2).sqrt(), 90);
-    let (d, p) = (index(angles.theta_d / FRAC_PI_2, 90), index(angles.phi_d / PI, 180));
-    [(h, d), (h, d + 1), (h + 1, d), (h + 1, d + 1)].map(|(h, d)| 3 * cell_index(h, d, p))
+    let index = |t: f64, n: usize, last: usize| ((t * n as f64 - 0.5).max(0.0) as usize).min(last);
+    let h = index((angles.theta_h / FRAC_PI_2).sqrt(), 90, 88);
+    3 * cell_index(h, index(angles.theta_d / FRAC_PI_2, 90, 88), index(angles.phi_d / PI, 180, 177))
 }
 
-/// The sum of eight cells, a channel at a time.
-fn sum_of_cells(values: &[f32], rows: [usize; 4]) -> [f32; 3] {
-    let [a, b, c, d] = rows.map(|start| &values[start..start + 6]);
-    let sums: [f32; 6] = std::array::from_fn(|i| (a[i] + b[i]) + (c[i] + d[i]));
+/// The sum of the eight cells, a channel at a time.
+fn sum_of_cells(values: &[f32], first: usize) -> [f32; 3] {
+    let [d, h] = STRIDES;
+    let near = &values[first..first + d + h + 8];
+    let sums: [f32; 8] = std::array::from_fn(|i| (near[i] + near[d + i]) + (near[h + i] + near[h + d + i]));
     std::array::from_fn(|c| sums[c] + sums[c + 3])
 }
 
@@ -93,12 +95,12 @@ fn bench(c: &mut Criterion) {
             }
         });
     });
-    let rows: Vec<_> = wi.iter().zip(&wo).map(|(&wi, &wo)| rows_about(wi, wo)).collect();
+    let first: Vec<_> = wi.iter().zip(&wo).map(|(&wi, &wo)| first_cell(wi, wo)).collect();
     let table = material.table().values().as_flattened();
     group.bench_function("reading_alone", |b| {
         b.iter(|| {
-            for (out, &rows) in values.iter_mut().zip(black_box(&rows)) {
-                *out = sum_of_cells(table, rows);
+            for (out, &first) in values.iter_mut().zip(black_box(&first)) {
+                *out = sum_of_cells(table, first);
             }
         });
     });

@@ -177,7 +177,7 @@ impl Material {
         if wo[2] > 0.0 { self.reflected.albedo(wo[2]) } else { [0.0; 3] }
     }
 
-    /// [`Material::eval`] at many pairs of directions, in the widest vector instructions of the processor: about three
+    /// [`Material::eval`] at many pairs of directions, in the widest vector instructions of the processor: several
     /// times as fast as single calls. It ends with the shortest of the three slices.
     pub fn eval_many(&self, wi: &[[f32; 3]], wo: &[[f32; 3]], out: &mut [[f32; 3]]) {
         let blocks = wi.chunks(LANES).zip(wo.chunks(LANES)).zip(out.chunks_mut(LANES));
