@@ -18,6 +18,13 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 const LN_2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
 
+/// An index or a count in the 32 bits that vector instructions convert.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "no table here has four billion numbers")]
+pub(crate) const fn index(i: usize) -> u32 {
+    i as u32
+}
+
 /// 1.5 * 2^23: what [`ROUND`] is in single precision.
 const ROUND_F32: f32 = 12_582_912.0;
 

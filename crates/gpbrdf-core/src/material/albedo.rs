@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::base::simd::index;
 use crate::brdf::LUMINANCE_WEIGHTS;
 use crate::material::density::{
     COLUMNS, DirectionDensities, ROWS, VIEWS, column_node, row_node, view_between, view_cosine,
@@ -185,8 +186,8 @@ fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<
         let (j, x) = (along / CELL_POINTS, within(along % CELL_POINTS));
         let (i, b) = (across / CELL_POINTS, within(across % CELL_POINTS));
         let between = |start: f32, end: f32, along: f32| start + (end - start) * along;
-        let row = between(row_node(j as u32), row_node(j as u32 + 1), x);
-        let column = between(column_node(i as u32), column_node(i as u32 + 1), b);
+        let row = between(row_node(index(j)), row_node(index(j) + 1), x);
+        let column = between(column_node(index(i)), column_node(index(i) + 1), b);
         let mut value = 0.0;
         for side in [-1.0, 1.0] {
             if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {

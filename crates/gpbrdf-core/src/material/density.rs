@@ -3,7 +3,7 @@
 //! Points are evaluated and drawn `N` at a time, in loops that do either arithmetic or reading, but not both: the
 //! former become vector instructions, and the latter do not wait for each other.
 
-use crate::base::simd::cell;
+use crate::base::simd::{cell, index};
 
 /// Number of elevations of the outgoing direction.
 pub const VIEWS: usize = 64;
@@ -66,7 +66,7 @@ pub(crate) fn view_cosine(index: usize, nodes: usize) -> f32 {
 /// The elevations about a cosine of `theta_o`, among `nodes`: the first, and the weight of the one after it.
 #[inline(always)]
 pub(crate) fn view_between(cosine: f32, nodes: usize) -> (u32, f32) {
-    cell(view_position(cosine, nodes), nodes as u32 - 2)
+    cell(view_position(cosine, nodes), index(nodes) - 2)
 }
 
 /// Position of a row node.
@@ -99,7 +99,7 @@ fn invert_linear(a: f32, b: f32, mass: f32) -> f32 {
 #[inline(always)]
 fn search<const M: usize>(sums: &[f32; M], target: f32) -> u32 {
     let above: u32 = sums.iter().map(|sum| (target - sum).to_bits() >> 31).sum();
-    (M as u32 - above).saturating_sub(1).min(M as u32 - 2)
+    (index(M) - above).saturating_sub(1).min(index(M) - 2)
 }
 
 const SQUARE: usize = ROWS * COLUMNS;
@@ -157,7 +157,7 @@ impl DirectionDensities {
         for k in 0..N {
             let (j, x) = row_cell(rows[k]);
             let (i, b) = column_cell(columns[k]);
-            starts[k] = (views.first[k] * ROWS as u32 + j) * COLUMNS as u32 + i;
+            starts[k] = (views.first[k] * index(ROWS) + j) * index(COLUMNS) + i;
             (along_row[k], along_column[k]) = (x, b);
         }
         let mut corners = [[0.0; N]; 8];
@@ -248,7 +248,7 @@ impl DirectionDensities {
 /// The cell of rows that holds a row coordinate, and how far into it that is.
 #[inline(always)]
 fn row_cell(row: f32) -> (u32, f32) {
-    let (j, _) = cell(row.sqrt().sqrt() * (ROWS - 1) as f32, ROWS as u32 - 2);
+    let (j, _) = cell(row.sqrt().sqrt() * (ROWS - 1) as f32, index(ROWS) - 2);
     let (low, high) = (row_node(j), row_node(j + 1));
     (j, ((row - low) / (high - low)).clamp(0.0, 1.0))
 }
@@ -256,7 +256,7 @@ fn row_cell(row: f32) -> (u32, f32) {
 /// The cell of columns that holds a column coordinate, and how far into it that is.
 #[inline(always)]
 fn column_cell(column: f32) -> (u32, f32) {
-    let (i, _) = cell((1.0 - (1.0 - column).sqrt()) * (COLUMNS - 1) as f32, COLUMNS as u32 - 2);
+    let (i, _) = cell((1.0 - (1.0 - column).sqrt()) * (COLUMNS - 1) as f32, index(COLUMNS) - 2);
     let (start, end) = (column_node(i), column_node(i + 1));
     (i, ((column - start) / (end - start)).clamp(0.0, 1.0))
 }
@@ -267,7 +267,7 @@ fn sums(values: &[f32], conditional: &mut [f32], marginal: &mut [f32]) -> f32 {
         let mut sum = 0.0;
         conditional[0] = 0.0;
         for i in 1..COLUMNS {
-            let width = f64::from(column_node(i as u32) - column_node(i as u32 - 1));
+            let width = f64::from(column_node(index(i)) - column_node(index(i) - 1));
             sum += 0.5 * width * (f64::from(values[i - 1]) + f64::from(values[i]));
             conditional[i] = narrow(sum);
         }
@@ -276,7 +276,7 @@ fn sums(values: &[f32], conditional: &mut [f32], marginal: &mut [f32]) -> f32 {
     let mut sum = 0.0;
     marginal[0] = 0.0;
     for j in 1..ROWS {
-        let height = f64::from(row_node(j as u32) - row_node(j as u32 - 1));
+        let height = f64::from(row_node(index(j)) - row_node(index(j) - 1));
         sum += 0.5 * height * (density(j - 1) + density(j));
         marginal[j] = narrow(sum);
     }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use crate::base::simd::cell;
+use crate::base::simd::{cell, index};
 use crate::base::trigonometry::atan2_upper;
 use crate::brdf::{N_PHI_D, N_THETA_D, N_THETA_H};
 
@@ -60,9 +60,9 @@ impl<const N: usize> Cells<N> {
             let p = phi_d * (N_PHI_D as f32 / PI) - 0.5;
             let (h, along_h) = between_centres(h, N_THETA_H);
             let (d, along_d) = between_centres(d, N_THETA_D);
-            let (p, along_p) = cell(if p < 0.0 { p + N_PHI_D as f32 } else { p }, N_PHI_D as u32 - 1);
-            let column = p.min(LAST_IN_ROW as u32);
-            out.first[k] = h * PLANE as u32 + d * ROW as u32 + 3 * column;
+            let (p, along_p) = cell(if p < 0.0 { p + N_PHI_D as f32 } else { p }, index(N_PHI_D) - 1);
+            let column = p.min(index(LAST_IN_ROW));
+            out.first[k] = h * index(PLANE) + d * index(ROW) + 3 * column;
             out.column[k] = p;
             (out.weights[0][k], out.weights[1][k], out.weights[2][k]) = (along_h, along_d, along_p);
         }
@@ -76,7 +76,7 @@ impl<const N: usize> Cells<N> {
 fn between_centres(position: f32, count: usize) -> (u32, f32) {
     let last = count as f32 - 1.0;
     let position = if position > 0.0 { position } else { 0.0 };
-    cell(if position < last { position } else { last }, count as u32 - 2)
+    cell(if position < last { position } else { last }, index(count) - 2)
 }
 
 /// The values of a table without gaps, sr^-1.
@@ -93,15 +93,15 @@ pub(crate) fn interpolate<const N: usize>(values: &[[f32; 3]], cells: &Cells<N>)
     }
     let mut out = [[0.0; 3]; N];
     for k in 0..N {
-        out[k] = if cells.column[k] <= LAST_IN_ROW as u32 {
+        out[k] = if cells.column[k] <= index(LAST_IN_ROW) {
             let [r, g, b, ..] = rows[k];
             let [_, _, _, next @ .., _, _] = rows[k];
             mix([r, g, b], next, along_p[k])
         } else {
             // The last cells of a row, beyond which the first one follows.
-            let start = cells.first[k] - 3 * LAST_IN_ROW as u32;
+            let start = cells.first[k] - 3 * index(LAST_IN_ROW);
             let cell_at = |p: u32| {
-                let first = if p < N_PHI_D as u32 { start + 3 * p } else { start };
+                let first = if p < index(N_PHI_D) { start + 3 * p } else { start };
                 single(values, first, along_h[k], along_d[k])
             };
             mix(cell_at(cells.column[k]), cell_at(cells.column[k] + 1), along_p[k])

@@ -60,8 +60,8 @@ fn the_right_cells_are_read() {
     let material = made(BrdfTable::from_values(values).unwrap());
     // Every column, where the last pair of columns joins the last one to the first, and the outermost rows.
     let corners = [[1e-4, 0.0], [0.3, 0.7], [0.02, 1.568]];
-    let angles = (0..7200).map(|i| (PI * (f64::from(i) + 0.3) / 7200.0, corners[(i % 3) as usize]));
-    for (phi_d, [theta_h, theta_d]) in angles {
+    for (i, [theta_h, theta_d]) in (0..7200u16).zip(corners.into_iter().cycle()) {
+        let phi_d = PI * (f64::from(i) + 0.3) / 7200.0;
         let (wi, wo) = HalfDiff { theta_h, theta_d, phi_d }.to_directions();
         let (wi, wo) = (narrow(wi), narrow(wo));
         let wide = |w: [f32; 3]| nalgebra::Vector3::from(w.map(f64::from));
