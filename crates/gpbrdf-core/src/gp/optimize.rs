@@ -180,7 +180,7 @@ where
 }
 
 /// The sum of the log densities of all priors at a point; their derivatives are added to `gradient`.
-fn log_prior(parameters: &[Parameter], point: &[f64], gradient: &mut [f64]) -> f64 {
+pub(crate) fn log_prior(parameters: &[Parameter], point: &[f64], gradient: &mut [f64]) -> f64 {
     let mut sum = 0.0;
     for (k, (parameter, &value)) in parameters.iter().zip(point).enumerate() {
         if let Some(prior) = parameter.prior {

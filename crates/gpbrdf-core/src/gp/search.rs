@@ -15,6 +15,10 @@ const NOISE_PRIOR: (f64, f64) = (2.5e-5, 2.5);
 /// of the library look like noise.
 const NOISE_PRIOR_OF_LOG: (f64, f64) = (1e-4, 1.0);
 
+/// Length scales and noise variances of the points from which a search may start, relative to the usual ones.
+const LENGTH_FACTORS: [f64; 3] = [1.0, 0.3, 0.1];
+const NOISE_FACTORS: [f64; 2] = [1.0, 30.0];
+
 /// Standard deviation of the logarithm of a signal variance about the usual variance of targets.
 const VARIANCE_DEVIATION: f64 = 1.2;
 
@@ -142,6 +146,24 @@ impl SearchStart {
         // The starts are finite, so they are accepted.
         let _accepted = self.kernel.set_log_parameters(&starts);
         self
+    }
+
+    /// Log-parameters from which a search may start: the usual ones, and with length scales of 0.3 and 0.1 times and
+    /// noise variances of 30 times those, as far as the bounds allow.
+    pub(crate) fn alternatives(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
+        let kinds = self.kernel.parameter_kinds();
+        LENGTH_FACTORS.iter().flat_map(|length| NOISE_FACTORS.iter().map(move |noise| (length, noise))).map(
+            move |(length, noise)| {
+                let factor = |k: usize| match kinds.get(k) {
+                    Some(ParameterKind::LengthScale(_)) => *length,
+                    Some(_) => 1.0,
+                    None if self.has_basis && k == kinds.len() => 1.0,
+                    None => *noise,
+                };
+                let moved = |(k, p): (usize, &Parameter)| (p.start + factor(k).ln()).clamp(p.lower, p.upper);
+                self.parameters.iter().enumerate().map(moved).collect()
+            },
+        )
     }
 
     /// Starts from these log-parameters, as far as the bounds allow.

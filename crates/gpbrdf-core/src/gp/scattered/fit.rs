@@ -12,9 +12,10 @@ use super::preconditioner::Preconditioner;
 use super::product::Covariance;
 use super::vecchia::{Targets, log_likelihood};
 use super::{NEAREST, ScatteredGp, Widening};
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::base::simd::dot;
 use crate::base::watch::Watch;
+use crate::gp::optimize::log_prior;
 use crate::gp::problem::{BasisTerm, Outliers, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::search::{SearchStart, extent};
@@ -154,8 +155,17 @@ impl<'a> Search<'a> {
             basis_variance: 0.0,
             weights: vec![1.0; data.len()],
         };
+        let mut start = start;
+        let mut evaluations = 0;
+        // What a basis leaves is small and smooth.
+        if problem.priors && problem.basis.is_none() {
+            evaluations = start.alternatives().count();
+            if let Some(point) = likeliest_start(problem, &data, &start, &state)? {
+                start.start_from(&point);
+            }
+        }
         let found = maximise(problem, &data, &start, &state, problem.optimize)?;
-        let evaluations = found.evaluations;
+        evaluations += found.evaluations;
         Ok(Self { problem, start, found, state, data, space, evaluations })
     }
 
@@ -207,7 +217,69 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Maximises the likelihood, with the weights of a state and neighbours in the metric of its kernel.
+/// The log marginal likelihood of hyper-parameters, with the weights of a state and neighbours in the metric of its
+/// kernel.
+struct Likelihood<'a> {
+    problem: &'a Problem<'a>,
+    data: &'a Data,
+    start: &'a SearchStart,
+    weights: &'a [f64],
+    kernel: Kernel,
+    /// Whether the whole covariance is factorised. With a basis all samples are correlated, so few samples are not
+    /// left to their neighbours.
+    is_exact: bool,
+    neighbours: Neighbours,
+    /// The samples over which the likelihood is summed.
+    terms: Vec<u32>,
+}
+
+impl<'a> Likelihood<'a> {
+    fn new(
+        problem: &'a Problem<'a>,
+        data: &'a Data,
+        start: &'a SearchStart,
+        state: &'a State,
+    ) -> Result<Self> {
+        let n = data.len();
+        let is_exact = data.basis.count > 0 && (n <= exact::MOST_SAMPLES || problem.factorises);
+        let neighbours = if is_exact {
+            Neighbours::default()
+        } else {
+            let count = conditioned_on(n);
+            Embedded::new(&data.x, &state.kernel).nearest_before(count, &problem.watch.part(0.0, 0.0))?
+        };
+        let (kernel, terms) = (state.kernel.clone(), evenly(n, TERMS));
+        Ok(Self { problem, data, start, weights: &state.weights, kernel, is_exact, neighbours, terms })
+    }
+
+    /// The value and its gradient at log-parameters.
+    fn at(&mut self, log_parameters: &[f64]) -> Result<(f64, Vec<f64>)> {
+        let n = self.data.len();
+        self.problem.watch.evaluation_towards(EVALUATIONS, search_share(n))?;
+        let others = self.start.set(&mut self.kernel, log_parameters)?;
+        let (shared, all) = self.data.noise(others.noise_variance, self.weights);
+        let process = Process {
+            kernel: &self.kernel,
+            x: &self.data.x,
+            noise: &all,
+            basis: &self.data.basis,
+            basis_variance: others.basis_variance,
+        };
+        let targets = Targets { y: &self.data.y, shared_noise: &shared };
+        let (value, mut gradient, scale) = if self.is_exact {
+            let (value, gradient) = exact::log_likelihood(&process, &targets)?;
+            (value, gradient, 1.0)
+        } else {
+            let (value, gradient) = log_likelihood(&process, &targets, &self.neighbours, &self.terms);
+            (value, gradient, n as f64 / self.terms.len() as f64)
+        };
+        gradient.truncate(log_parameters.len());
+        gradient.iter_mut().for_each(|g| *g *= scale);
+        Ok((scale * value, gradient))
+    }
+}
+
+/// Maximises the likelihood.
 fn maximise(
     problem: &Problem<'_>,
     data: &Data,
@@ -215,41 +287,33 @@ fn maximise(
     state: &State,
     options: &OptimizeOptions,
 ) -> Result<Optimum> {
-    let n = data.len();
-    // With a basis all samples are correlated, so few samples are not left to their neighbours.
-    let is_exact = data.basis.count > 0 && (n <= exact::MOST_SAMPLES || problem.factorises);
-    let neighbours = if is_exact {
-        Neighbours::default()
-    } else {
-        let count = conditioned_on(n);
-        Embedded::new(&data.x, &state.kernel).nearest_before(count, &problem.watch.part(0.0, 0.0))?
-    };
-    let until = search_share(n);
-    let subset = evenly(n, TERMS);
-    let scale = n as f64 / subset.len() as f64;
-    let mut kernel = state.kernel.clone();
-    maximize(&start.parameters, n * data.y.len(), options, |p| {
-        problem.watch.evaluation_towards(EVALUATIONS, until)?;
-        let others = start.set(&mut kernel, p)?;
-        let (shared, all) = data.noise(others.noise_variance, &state.weights);
-        let process = Process {
-            kernel: &kernel,
-            x: &data.x,
-            noise: &all,
-            basis: &data.basis,
-            basis_variance: others.basis_variance,
+    let mut likelihood = Likelihood::new(problem, data, start, state)?;
+    maximize(&start.parameters, data.len() * data.y.len(), options, |p| likelihood.at(p))
+}
+
+/// The most probable one of several starts: many samples with much noise have one optimum where the samples are rough
+/// and another, poorer one where nearly all of their variance is noise, and a search that begins with smooth functions
+/// and little noise may end in that one.
+fn likeliest_start(
+    problem: &Problem<'_>,
+    data: &Data,
+    start: &SearchStart,
+    state: &State,
+) -> Result<Option<Vec<f64>>> {
+    let mut likelihood = Likelihood::new(problem, data, start, state)?;
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for point in start.alternatives() {
+        let value = match likelihood.at(&point) {
+            Ok((value, _)) => value + log_prior(&start.parameters, &point, &mut []),
+            Err(Error::Cancelled) => return Err(Error::Cancelled),
+            // Where there is no likelihood, no search begins.
+            Err(_) => continue,
         };
-        let targets = Targets { y: &data.y, shared_noise: &shared };
-        if is_exact {
-            let (value, mut gradient) = exact::log_likelihood(&process, &targets)?;
-            gradient.truncate(p.len());
-            return Ok((value, gradient));
+        if value.is_finite() && best.as_ref().is_none_or(|(known, _)| *known < value) {
+            best = Some((value, point));
         }
-        let (value, mut gradient) = log_likelihood(&process, &targets, &neighbours, &subset);
-        gradient.truncate(p.len());
-        gradient.iter_mut().for_each(|g| *g *= scale);
-        Ok((scale * value, gradient))
-    })
+    }
+    Ok(best.map(|(_, point)| point))
 }
 
 /// At most `count` of the indices `0..n`, evenly spaced, all where there are no more.

@@ -237,6 +237,24 @@ fn outliers_are_found_and_nothing_else() {
     assert!(noise > 0.1 && report.weights.is_empty(), "{noise}");
 }
 
+/// Ripples of a smooth function, half as high as its noise is wide: they are not taken for noise, though a search that
+/// begins with smooth functions would end there.
+#[test]
+fn ripples_under_noise_are_found() {
+    let (points, mut y) = data(3000, 0.2);
+    for y in &mut y {
+        let ripple = |p: &[f64; 3]| 0.3 * (40.0 * p[0]).sin() * (40.0 * p[1]).cos();
+        y.iter_mut().zip(&points).for_each(|(y, p)| *y += ripple(p));
+    }
+    let (kernel, noise) = with_problem(&y, Outliers::Keep, |problem| {
+        let data = Data::new(&points, &y, &[], None);
+        let search = Search::begin(problem, InputSpace::PolarAngles, data).unwrap();
+        let (_, state, _) = search.finish().unwrap();
+        (state.kernel, state.noise_variance.sqrt())
+    });
+    assert!((noise / 0.2 - 1.0).abs() < 0.1, "{noise} {kernel:?}");
+}
+
 #[test]
 fn the_order_of_samples_changes_no_bit() {
     let (points, y) = data(500, 0.05);
