@@ -116,7 +116,8 @@ pub(crate) struct Display {
     /// Half of a side of the ground, and its height.
     pub(crate) ground_half: f32,
     pub(crate) ground_height: f32,
-    pub(crate) padding: f32,
+    /// Up to which height of a unit direction the map is mirrored at the horizon behind the ground.
+    pub(crate) horizon: f32,
 }
 
 /// `Separable` of `bake/separable.wgsl`.

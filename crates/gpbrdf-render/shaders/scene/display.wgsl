@@ -22,7 +22,9 @@ struct Display {
     // Half of a side of the ground, and its height.
     ground_half: f32,
     ground_height: f32,
-    padding: f32,
+    // Behind the ground the map is mirrored at the horizon up to this height of a unit direction; 0 where it is shown
+    // as it is.
+    horizon: f32,
 }
 
 const SHOW_TRUTH: u32 = 0u;
@@ -96,10 +98,10 @@ fn background_radiance(pixel: vec2u) -> vec3f {
         across = at.x * view.right.xyz + at.y * view.up.xyz;
     }
     let w = normalize(view.forward.xyz + across);
-    let behind = map_radiance(w);
     if display.ground_size == 0u || view.eye.w == 0.0 || view.eye.y <= display.ground_height || w.y >= -1e-4 {
-        return behind;
+        return map_radiance(w);
     }
+    let behind = map_radiance(select(w, normalize(vec3f(w.x, min(-w.y, display.horizon), w.z)), display.horizon > 0.0));
     let met = view.eye.xyz + (display.ground_height - view.eye.y) / w.y * w;
     let distance = length(met.xz) / display.ground_half;
     let fade = smoothstep(0.25, 1.0, distance);

@@ -186,6 +186,7 @@ pub(crate) struct GroundBuffer {
     size: u32,
     half: f32,
     height: f32,
+    horizon: f32,
 }
 
 impl GroundBuffer {
@@ -201,6 +202,7 @@ impl GroundBuffer {
             size: gpu_types::to_u32(radiance.width()),
             half: ground.half(),
             height: ground.height(),
+            horizon: ground.horizon(),
         })
     }
 }
@@ -285,7 +287,7 @@ fn uniform_of(display: &Display, shown: &Shown<'_>, size: [u32; 2]) -> gpu_types
         ground_size: shown.ground.map_or(0, |ground| ground.size),
         ground_half: shown.ground.map_or(1.0, |ground| ground.half),
         ground_height: shown.ground.map_or(0.0, |ground| ground.height),
-        padding: 0.0,
+        horizon: shown.ground.map_or(0.0, |ground| ground.horizon),
     }
 }
 

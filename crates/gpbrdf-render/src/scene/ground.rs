@@ -5,6 +5,7 @@ use gpbrdf_core::Environment;
 use gpbrdf_core::base::{Raster, quasi_random_pair};
 use rayon::prelude::*;
 
+use super::colour::luminance;
 use super::gbuffer::Geometry;
 use super::mesh::Mesh;
 
@@ -14,6 +15,8 @@ const TEXELS: usize = 224;
 const HALF: f32 = 7.0;
 /// The share of the light that the ground reflects.
 const ALBEDO: f32 = 0.17;
+/// How much of the tint of the light that is left in a shadow is shown.
+const TINT: f32 = 0.3;
 /// Columns and rows of patches to which the environment is averaged.
 const PATCHES: (usize, usize) = (96, 48);
 /// Triangles that are projected at most, all directions together.
@@ -25,12 +28,16 @@ const MOST_TRIANGLES: usize = 12_000_000;
 /// Its radiance is `albedo / pi` times the irradiance from above, over directions that the object does not hide. These
 /// are drawn from the environment by their share of that irradiance, one from each of equally large shares; an object
 /// hides a direction from where its projection along it falls. The ground is not reflected by the object.
+///
+/// Shadows have that luminance, but only three tenths of their own tint: what is left of the light where a warm lamp is
+/// hidden may be as blue as the sky, and beside the colour of a material that looks like a stain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
     /// Radiance, rows along z from the far side (-z) to the near one, columns along x.
     radiance: Raster<[f32; 3]>,
     /// Its height, y.
     height: f32,
+    horizon: f32,
 }
 
 /// Light from a distant direction, as an irradiance of the ground.
@@ -69,7 +76,9 @@ impl Ground {
                 || vec![[0.0; 3]; TEXELS * TEXELS],
                 |a, b| std::iter::zip(a, b).map(|(a, b)| add(a, b)).collect(),
             );
-        let scaled = |i: usize, j: usize| sums[j * TEXELS + i].map(|x| x * ALBEDO / std::f32::consts::PI);
+        let open = beams.iter().fold([0.0; 3], |sum, beam| add(sum, beam.irradiance));
+        let scaled =
+            |i: usize, j: usize| toned(open, sums[j * TEXELS + i]).map(|x| x * ALBEDO / std::f32::consts::PI);
         // Neighbours share the noise of the few directions.
         let smooth = |i: usize, j: usize| {
             let near = |k: usize| k.saturating_sub(1)..=(k + 1).min(TEXELS - 1);
@@ -78,7 +87,21 @@ impl Ground {
                 texels.fold(([0.0; 3], 0.0), |(sum, count), (x, y)| (add(sum, scaled(x, y)), count + 1.0));
             sum.map(|x| x / count)
         };
-        Self { radiance: Raster::from_fn(TEXELS, TEXELS, smooth), height }
+        Self { radiance: Raster::from_fn(TEXELS, TEXELS, smooth), height, horizon: 0.0 }
+    }
+
+    /// The ground before another horizon: beyond its rim, what the environment shows above the horizon is mirrored at
+    /// it up to this height of a unit direction, and goes on from there, in place of what the environment shows below.
+    /// With 0 it shows the latter.
+    #[must_use]
+    pub fn with_horizon(self, horizon: f32) -> Self {
+        Self { horizon, ..self }
+    }
+
+    /// Up to which height of a unit direction the environment is mirrored at the horizon.
+    #[must_use]
+    pub fn horizon(&self) -> f32 {
+        self.horizon
     }
 
     /// Its height, y in the world.
@@ -102,6 +125,14 @@ impl Ground {
 
 fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] + b[c])
+}
+
+/// An irradiance with [`TINT`] of its tint and the rest of the tint of the light without an object; its luminance stays.
+#[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the device")]
+fn toned(open: [f32; 3], irradiance: [f32; 3]) -> [f32; 3] {
+    let whole = luminance(&open);
+    let share = if whole > 0.0 { (luminance(&irradiance) / whole) as f32 } else { 0.0 };
+    std::array::from_fn(|c| TINT * irradiance[c] + (1.0 - TINT) * share * open[c])
 }
 
 /// Directions above the ground, each of which stands for an equal share of the irradiance.
@@ -263,6 +294,21 @@ mod tests {
         let brightest = exact.radiance().pixels().iter().map(|p| p[1]).fold(0.0, f32::max);
         let gap: f32 = pairs.map(|(a, b)| (a[1] - b[1]).abs()).sum::<f32>() / (TEXELS * TEXELS) as f32;
         assert!(gap < 0.01 * brightest, "{gap} of {brightest}");
+    }
+
+    #[test]
+    fn shadows_keep_their_luminance_and_little_of_their_tint() {
+        let environment = Environment::studio();
+        let (open, shadow) = ([4.0, 3.8, 3.6], [0.5, 0.7, 1.1]);
+        let found = toned(open, shadow);
+        assert!((luminance(&found) / luminance(&shadow) - 1.0).abs() < 1e-6, "{found:?}");
+        assert_eq!(toned([0.0; 3], [0.0; 3]), [0.0; 3]);
+        let ground = Ground::new(&Geometry::Sphere, &environment, 320);
+        let blue = |p: &[f32; 3]| p[2] / p[0];
+        // The fill lights of the studio are twice as blue as red; its key light is warm.
+        let most = ground.radiance().pixels().iter().map(blue).fold(0.0, f32::max);
+        let least = ground.radiance().pixels().iter().map(blue).fold(f32::INFINITY, f32::min);
+        assert!(most < 1.35 * least && most > 1.02 * least, "{most} and {least}");
     }
 
     #[test]

@@ -125,7 +125,7 @@ fn structs_are_laid_out_as_in_wgsl() {
         layout!(Shade: viewer, light, strength, size, environment_size, first_row, first_sample, sample_count,
             light_kind, sampling, single_material, min_cosine, cosine_share),
         layout!(Display: size, environment_size, show, tone, encoding, background, samples, exposure, limit,
-            split, ground_size, ground_half, ground_height, padding),
+            split, ground_size, ground_half, ground_height, horizon),
         layout!(Separable: shape, first, third, second, pieces, signal_variance, second_prior, limit, share;
             padding),
         layout!(KernelSum: first_cell, last_cell, first_sample, last_sample, chord),

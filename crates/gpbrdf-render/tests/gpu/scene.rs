@@ -291,6 +291,20 @@ fn the_ground_is_seen_where_rays_meet_it(context: &Context) {
         compared += 1;
     }
     assert!(compared > 2000, "{compared}");
+    // A map that is black below the horizon: the ground fades into what is above it.
+    let half = Raster::from_fn(16, 8, |_, y| if y < 4 { [0.6; 3] } else { [0.0; 3] });
+    renderer.set_light(Light::Environment((&Environment::new(half).unwrap()).into())).unwrap();
+    renderer.set_camera(Camera::perspective(0.9, 0.5).orbited(0.4, 0.15)).unwrap();
+    let mut darkest = |ground: Ground| {
+        renderer.set_ground(Some(&ground)).unwrap();
+        renderer.render_more(1).unwrap();
+        let shown = renderer.read_display(&Display::default()).unwrap();
+        // Just below the horizon, which is at the height of the middle of the first rows.
+        shown[90 * 12..90 * 26].iter().map(|pixel| pixel[1]).min().unwrap()
+    };
+    let plain = darkest(ground.clone());
+    let mirrored = darkest(ground.clone().with_horizon(0.5));
+    assert!(plain < 90 && mirrored > plain + 40, "{plain} {mirrored}");
     // Without a ground there is the map.
     renderer.set_ground(None).unwrap();
     let plain = renderer.read_display(&Display::default()).unwrap();

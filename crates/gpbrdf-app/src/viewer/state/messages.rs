@@ -35,6 +35,8 @@ pub(crate) struct Messages {
 
 /// The oldest notes and successes are dropped where there are more than this.
 const NOTES: usize = 3;
+/// The oldest errors are dropped where there are more than this, which nobody reads any more.
+const ERRORS: usize = 100;
 
 impl Messages {
     /// Reports a failure.
@@ -56,12 +58,14 @@ impl Messages {
         if !self.list.iter().any(|known| known.text == text) {
             self.list.push(Message { kind, text, since: None });
         }
-        // Notes make room for newer ones; errors stay until they are read.
-        let notes = self.list.iter().filter(|m| m.kind != Kind::Error).count();
-        if notes > NOTES
-            && let Some(oldest) = self.list.iter().position(|m| m.kind != Kind::Error)
-        {
-            self.list.remove(oldest);
+        // Notes make room for newer ones; errors stay until they are read, or are too many for that.
+        for (is_error, most) in [(false, NOTES), (true, ERRORS)] {
+            let is_like = |m: &Message| (m.kind == Kind::Error) == is_error;
+            if self.list.iter().filter(|m| is_like(m)).count() > most
+                && let Some(oldest) = self.list.iter().position(is_like)
+            {
+                self.list.remove(oldest);
+            }
         }
     }
 
@@ -111,6 +115,12 @@ mod tests {
         assert_eq!((count(true), count(false)), (20, NOTES));
         assert_eq!(messages.list[0].text, "error 0");
         assert!(messages.list.iter().any(|m| m.text == "note 19"));
+        // An error of each minute of a day.
+        for i in 20..1440 {
+            messages.error(format!("error {i}"));
+        }
+        assert_eq!(messages.list.iter().filter(|m| m.kind == Kind::Error).count(), ERRORS);
+        assert!(messages.list.iter().any(|m| m.text == "error 1439"));
     }
 
     #[test]

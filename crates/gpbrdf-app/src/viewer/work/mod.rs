@@ -5,6 +5,7 @@ pub(crate) mod curves;
 pub(crate) mod dialogs;
 pub(crate) mod export;
 pub(crate) mod fitter;
+mod grain;
 pub(crate) mod mailbox;
 pub(crate) mod outbox;
 pub(crate) mod planner;

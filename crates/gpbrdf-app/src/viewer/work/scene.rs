@@ -20,6 +20,7 @@ use gpbrdf_render::{
 };
 use rayon::prelude::*;
 
+use super::grain::without_grain;
 use super::mailbox::{Mailbox, Sender};
 use super::outbox::Outbox;
 use super::quality::{Measured, Measurer, Quality};
@@ -49,6 +50,8 @@ pub(crate) struct SceneKey {
     pub(crate) orbit: Orbit,
     pub(crate) light: SphereLight,
     pub(crate) environment: u64,
+    /// Whether the environment is the built-in studio.
+    pub(crate) studio: bool,
     /// Pixels of one picture; there are two of this size side by side.
     pub(crate) size: [u32; 2],
     pub(crate) shown: SphereShown,
@@ -180,6 +183,9 @@ const SPHERE_ELEVATION: f32 = 0.2;
 /// Directions of the light on the ground: in the small picture, and in the whole one.
 const GROUND_AT_FIRST: usize = 48;
 const GROUND_DIRECTIONS: usize = 320;
+
+/// The height of a unit direction from which on the studio is sky.
+const STUDIO_HORIZON: f32 = 0.08;
 
 /// Samples of a smooth picture.
 const SAMPLES: u32 = 192;
@@ -348,7 +354,13 @@ impl Scene {
             let exposure = known.map_or_else(found, |(_, exposure)| exposure);
             self.exposure = Some((key.clone(), exposure));
             self.limits = limits(&linear, exposure * key.stops());
-            outbox.send(SceneResult::Picture(Box::new(self.image(request, None)?)));
+            let mut small = self.image(request, None)?;
+            if !matches!(key.show()[0], Show::Difference | Show::Sigma) {
+                let inside: Vec<bool> = linear.raster().pixels().iter().map(is_inside).collect();
+                small.image = without_grain(&small.image, &inside);
+                small.beside = small.beside.map(|beside| without_grain(&beside, &inside));
+            }
+            outbox.send(SceneResult::Picture(Box::new(small)));
         }
         if stale() {
             return Ok(());
@@ -362,7 +374,7 @@ impl Scene {
             if samples >= FIRST_SAMPLES {
                 if let Some(map) = self.turned.as_ref().filter(|_| self.ground == GROUND_AT_FIRST) {
                     self.ground = GROUND_DIRECTIONS;
-                    renderer.set_ground(Some(&Ground::new(&self.geometry, map, self.ground)))?;
+                    renderer.set_ground(Some(&ground(&self.geometry, map, key, self.ground)))?;
                 }
                 outbox.send(SceneResult::Picture(Box::new(self.image(request, Some(samples))?)));
                 self.measure(request, samples, outbox)?;
@@ -476,7 +488,7 @@ impl Scene {
         }
         if changed(&|l| same_light(l) && l.shape == key.shape) {
             self.ground = GROUND_AT_FIRST;
-            let ground = self.turned.as_ref().map(|map| Ground::new(&self.geometry, map, self.ground));
+            let ground = self.turned.as_ref().map(|map| ground(&self.geometry, map, key, self.ground));
             renderer.set_ground(ground.as_ref())?;
         }
         // A small picture that was interrupted says nothing of the whole one.
@@ -538,6 +550,13 @@ fn light(context: &Context, key: &SceneKey, environment: &Environment) -> gpbrdf
         });
     }
     Ok(Light::Environment(EnvironmentLight::for_device(context, environment)?))
+}
+
+/// The ground under an object. The studio's floor is dark and far below; the ground goes on into what is above the
+/// horizon instead. Other environments show their own ground beyond it.
+fn ground(geometry: &Geometry, map: &Environment, key: &SceneKey, directions: usize) -> Ground {
+    let ground = Ground::new(geometry, map, directions);
+    if key.studio { ground.with_horizon(STUDIO_HORIZON) } else { ground }
 }
 
 /// The environment turned by `yaw` about the vertical axis, which takes the light before the object to its right, and

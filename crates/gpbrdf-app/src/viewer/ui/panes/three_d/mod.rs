@@ -55,12 +55,14 @@ struct Map {
     number: u64,
     name: String,
     environment: Arc<Environment>,
+    /// Whether it is the built-in one.
+    is_studio: bool,
 }
 
 impl Map {
     fn studio(number: u64) -> Self {
         let environment = Arc::new(Environment::studio());
-        Self { number, name: "Studio (built in)".to_owned(), environment }
+        Self { number, name: "Studio (built in)".to_owned(), environment, is_studio: true }
     }
 }
 
@@ -161,7 +163,8 @@ impl Pane for ThreeD {
                 Message::Map(Ok((path, environment))) => {
                     let name =
                         path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-                    self.map = Map { number: self.map.number + 1, name, environment };
+                    let number = self.map.number + 1;
+                    self.map = Map { number, name, environment, is_studio: false };
                     self.look.environment = Some(path);
                 }
                 Message::Map(Err(message)) => cx.messages.error(message),

@@ -145,6 +145,7 @@ impl ObjectView {
             orbit: look.orbit,
             light: look.light,
             environment: map.number,
+            studio: map.is_studio,
             size,
             shown: look.shown,
             swipe: look.swipe,
