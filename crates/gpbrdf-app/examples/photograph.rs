@@ -50,7 +50,7 @@ const MEASURED: &str = "rough-copper.csv";
 const MANY: &str = "many.csv";
 const MISSING: [&str; 6] = ["a.bsdf", "b.bsdf", "c.binary", "d.csv", "e.json", "f.exr"];
 
-const SCENES: [Scene; 14] = [
+const SCENES: [Scene; 17] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
@@ -87,6 +87,23 @@ const SCENES: [Scene; 14] = [
     },
     Scene { name: "check-errors", open: &MISSING, ..PLAIN },
     Scene { name: "check-light", open: &["purple-paint", "ward"], settings: r#"{"dark": false}"#, ..PLAIN },
+    Scene {
+        name: "check-sigma",
+        open: &["purple-paint"],
+        settings: r#"{"view": "3d", "panes": {"3d": {"shape": "Knot", "shown": "Sigma"}}}"#,
+        ..PLAIN
+    },
+    Scene {
+        name: "check-difference",
+        open: &["purple-paint"],
+        settings: r#"{"view": "3d", "panes": {"3d": {"shape": "Knot", "shown": "Difference"}}}"#,
+        ..PLAIN
+    },
+    Scene {
+        name: "check-sigma-sphere",
+        settings: r#"{"view": "3d", "panes": {"3d": {"shown": "Sigma"}}}"#,
+        ..PLAIN
+    },
     Scene { name: "check-small", size: [1024.0, 700.0], ..PLAIN },
     Scene {
         name: "check-large-text",

@@ -8,6 +8,9 @@ use super::widgets::short;
 use crate::viewer::state::document::{Document, Fitted, Work};
 use crate::viewer::state::documents::Documents;
 
+/// The width that the time of the last frame takes. It is left out rather than put on a second line.
+const FRAME_ROOM: f32 = 110.0;
+
 /// The selected material, the size and the time of its fit, what is being done, how far the others are, and the time of
 /// the last frame.
 pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
@@ -26,6 +29,9 @@ pub(crate) fn status_ui(ui: &mut Ui, documents: &Documents, frame: Duration) {
             ui.label("Nothing is open");
         }
         others_ui(ui, documents);
+        if ui.available_size_before_wrap().x < FRAME_ROOM {
+            return;
+        }
         ui.separator();
         let text = format!("UI {:.1} ms", 1e3 * frame.as_secs_f64());
         ui.weak(text).on_hover_text("The time that the window itself took for the last frame");

@@ -32,6 +32,11 @@ use crate::viewer::work::outbox::Outbox;
 const LOG: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::L);
 const COSINE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::C);
 
+/// The width of the boxes to tick that follow the kinds of curves, with a line before them.
+const BOXES: f32 = 150.0;
+/// In a narrower pane the channels have a line of their own, so that they stay together.
+const NARROW: f32 = 430.0;
+
 /// What a curve was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct CurveKey {
@@ -213,7 +218,9 @@ impl Plots {
             ui.label(RichText::new("Plots").strong().size(15.0));
             ui.add_space(6.0);
             segments_ui(ui, &mut self.look.kind, &CurveKind::ALL, CurveKind::name);
-            ui.separator();
+            if ui.available_size_before_wrap().x > BOXES {
+                ui.separator();
+            }
             ui.checkbox(&mut self.look.log, "Log").on_hover_text(format!("Logarithmic values ({log})"));
             ui.checkbox(&mut self.look.times_cosine, subscripted("× cos θi"))
                 .on_hover_text(format!("Times the cosine of the light ({cosine})"));
@@ -223,6 +230,8 @@ impl Plots {
     /// Where the curves cut the BRDF, and of which channel they are.
     fn place_ui(&mut self, ui: &mut Ui) {
         let look = &mut self.look;
+        let names = |c| if c == Channel::Rgb { "Mean" } else { Channel::name(c) };
+        let is_narrow = ui.available_width() < NARROW;
         ui.horizontal_wrapped(|ui| {
             let slider = |ui: &mut Ui, name: &str, high: f64, default: f64, value: &mut f64| {
                 let mut number =
@@ -248,9 +257,13 @@ impl Plots {
                     ui.checkbox(&mut look.samples, "Samples").on_hover_text("Measurements near the curve");
                 }
             }
-            let names = |c| if c == Channel::Rgb { "Mean" } else { Channel::name(c) };
-            segments_ui(ui, &mut look.channel, &Channel::ALL, names);
+            if !is_narrow {
+                segments_ui(ui, &mut look.channel, &Channel::ALL, names);
+            }
         });
+        if is_narrow {
+            ui.horizontal_wrapped(|ui| segments_ui(ui, &mut look.channel, &Channel::ALL, names));
+        }
     }
 
     /// Computes the curves that have changed and drops those that are no longer visible.
