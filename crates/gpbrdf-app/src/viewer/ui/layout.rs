@@ -9,7 +9,7 @@ use crate::viewer::state::settings::Settings;
 
 /// Room that all views need at once, and that one needs.
 const ROOMY: Vec2 = egui::vec2(840.0, 560.0);
-const LEAST: Vec2 = egui::vec2(400.0, 300.0);
+const LEAST: Vec2 = egui::vec2(360.0, 300.0);
 
 /// Between the views of the overview.
 const GAP: f32 = 14.0;

@@ -220,6 +220,8 @@ impl Plots {
             segments_ui(ui, &mut self.look.kind, &CurveKind::ALL, CurveKind::name);
             if ui.available_size_before_wrap().x > BOXES {
                 ui.separator();
+            } else {
+                ui.end_row();
             }
             ui.checkbox(&mut self.look.log, "Log").on_hover_text(format!("Logarithmic values ({log})"));
             ui.checkbox(&mut self.look.times_cosine, subscripted("× cos θi"))
