@@ -50,7 +50,7 @@ const MEASURED: &str = "rough-copper.csv";
 const MANY: &str = "many.csv";
 const MISSING: [&str; 6] = ["a.bsdf", "b.bsdf", "c.binary", "d.csv", "e.json", "f.exr"];
 
-const SCENES: [Scene; 17] = [
+const SCENES: [Scene; 18] = [
     PLAIN,
     Scene {
         name: "viewer-slices",
@@ -77,6 +77,8 @@ const SCENES: [Scene; 17] = [
         after: Some(Duration::from_secs(2)),
         ..PLAIN
     },
+    // Says when the first picture of the object was there.
+    Scene { name: "check-start", after: Some(Duration::from_secs(10)), ..PLAIN },
     Scene { name: "viewer-data", open: &[MEASURED], settings: r#"{"view": "data"}"#, ..PLAIN },
     Scene { name: "check-glossy", open: &["silver-paint"], ..PLAIN },
     Scene {

@@ -127,7 +127,8 @@ fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// An irradiance with [`TINT`] of its tint and the rest of the tint of the light without an object; its luminance stays.
+/// An irradiance with [`TINT`] of its tint and the rest of the tint of the light without an object. Its luminance
+/// stays.
 #[expect(clippy::cast_possible_truncation, reason = "f32 is the precision of the device")]
 fn toned(open: [f32; 3], irradiance: [f32; 3]) -> [f32; 3] {
     let whole = luminance(&open);

@@ -199,6 +199,8 @@ const SMALL_SAMPLES: u32 = 24;
 enum Stop {
     /// The device was lost. Another one may do.
     Lost(String),
+    /// The file of the object cannot be read. Nothing is wrong with the device.
+    File(String),
     Error(String),
 }
 
@@ -249,9 +251,14 @@ pub(crate) fn spawn(
                 .send(SceneResult::DeviceLost(format!("the graphics device \"{name}\" is lost: {message}")));
             result = scene.render(&request, &outbox, stale, &busy);
         }
-        if let Err(Stop::Lost(message) | Stop::Error(message)) = result {
-            scene.clear();
-            outbox.send(SceneResult::Failed(message));
+        match result {
+            Ok(()) => {}
+            // Shaders stay compiled, which takes as long as a fit.
+            Err(Stop::File(message)) => outbox.send(SceneResult::Failed(message)),
+            Err(Stop::Lost(message) | Stop::Error(message)) => {
+                scene.clear();
+                outbox.send(SceneResult::Failed(message));
+            }
         }
     };
     Mailbox::spawn("scene", move |work: SceneWork, stale| pool.install(|| serve(work, stale)))
@@ -470,7 +477,7 @@ impl Scene {
         let last = self.last.take();
         let changed = |same: &dyn Fn(&SceneKey) -> bool| last.as_ref().is_none_or(|last| !same(last));
         if changed(&|l| l.shape == key.shape) {
-            self.geometry = key.shape.geometry().map_err(Stop::Error)?;
+            self.geometry = key.shape.geometry().map_err(Stop::File)?;
             renderer.set_geometry(&self.geometry)?;
         }
         if changed(&|l| l.size == key.size) {
