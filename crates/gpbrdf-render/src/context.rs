@@ -73,7 +73,7 @@ impl Context {
             label: Some("gpbrdf"),
             required_features: adapter.features() & Self::OPTIONAL_FEATURES,
             required_limits: Self::required_limits(&adapter),
-            // Larger blocks would be no faster here, and stay where one picture of many is left in them.
+            // A block stays as long as one of many buffers is left in it.
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         }))
