@@ -34,6 +34,9 @@ const TERMS: usize = 1000;
 /// The largest number of iterations after neighbours or weights have changed.
 const LATER_ITERATIONS: u64 = 20;
 
+/// The fewest samples whose search has several points to start from.
+const SEVERAL_STARTS: usize = 500;
+
 /// How often weights of outliers are renewed at most.
 const WEIGHT_ROUNDS: usize = 4;
 
@@ -157,8 +160,8 @@ impl<'a> Search<'a> {
         };
         let mut start = start;
         let mut evaluations = 0;
-        // What a basis leaves is small and smooth.
-        if problem.priors && problem.basis.is_none() {
+        // What a basis leaves is small and smooth, and of few samples the priors decide.
+        if problem.priors && problem.basis.is_none() && data.len() >= SEVERAL_STARTS {
             evaluations = start.alternatives().count();
             if let Some(point) = likeliest_start(problem, &data, &start, &state)? {
                 start.start_from(&point);
