@@ -93,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "8773a838cd3da2352d44ef61443b11547e29ba7225dfc0021df944d7a219d553";
+    pub const BUILT_IN_SHA256: &str = "e18d51969258ada6a866ba488b8a35fd673116777e2b55e35115253cb136548c";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]

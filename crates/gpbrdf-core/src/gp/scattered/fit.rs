@@ -35,7 +35,7 @@ const TERMS: usize = 1000;
 const LATER_ITERATIONS: u64 = 20;
 
 /// The fewest samples whose search has several points to start from.
-const SEVERAL_STARTS: usize = 500;
+const SEVERAL_STARTS: usize = 1000;
 
 /// How often weights of outliers are renewed at most.
 const WEIGHT_ROUNDS: usize = 4;
