@@ -148,22 +148,26 @@ impl SearchStart {
         self
     }
 
-    /// Log-parameters from which a search may start: the usual ones, and with length scales of 0.3 and 0.1 times and
-    /// noise variances of 30 times those, as far as the bounds allow.
-    pub(crate) fn alternatives(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
+    /// Log-parameters from which a search may start: the usual ones, and with shorter length scales and more noise, as
+    /// far as the bounds allow.
+    pub(crate) fn alternatives(&self) -> Vec<Vec<f64>> {
         let kinds = self.kernel.parameter_kinds();
-        LENGTH_FACTORS.iter().flat_map(|length| NOISE_FACTORS.iter().map(move |noise| (length, noise))).map(
-            move |(length, noise)| {
-                let factor = |k: usize| match kinds.get(k) {
-                    Some(ParameterKind::LengthScale(_)) => *length,
-                    Some(_) => 1.0,
-                    None if self.has_basis && k == kinds.len() => 1.0,
-                    None => *noise,
-                };
-                let moved = |(k, p): (usize, &Parameter)| (p.start + factor(k).ln()).clamp(p.lower, p.upper);
-                self.parameters.iter().enumerate().map(moved).collect()
-            },
-        )
+        let point = |length: f64, noise: f64| {
+            let factor = |k: usize| match kinds.get(k) {
+                Some(ParameterKind::LengthScale(_)) => length,
+                Some(_) => 1.0,
+                None if self.has_basis && k == kinds.len() => 1.0,
+                None => noise,
+            };
+            let moved = |(k, p): (usize, &Parameter)| (p.start + factor(k).ln()).clamp(p.lower, p.upper);
+            self.parameters.iter().enumerate().map(moved).collect()
+        };
+        let noises = if self.noise == Noise::Optimized { &NOISE_FACTORS[..] } else { &[1.0] };
+        LENGTH_FACTORS
+            .iter()
+            .flat_map(|&length| noises.iter().map(move |&noise| (length, noise)))
+            .map(|(length, noise)| point(length, noise))
+            .collect()
     }
 
     /// Starts from these log-parameters, as far as the bounds allow.

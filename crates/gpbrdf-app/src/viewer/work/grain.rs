@@ -12,8 +12,8 @@ const ALIKE: f32 = 26.0;
 
 /// A picture without grain: each pixel inside of the object becomes the mean of those around it, with larger weights
 /// where they are near and of a similar colour, so that edges and highlights stay (C. Tomasi and R. Manduchi,
-/// "Bilateral Filtering for Gray and Color Images", 1998). Pixels outside neither change nor take part. Takes about a
-/// millisecond for 30,000 pixels.
+/// "Bilateral Filtering for Gray and Color Images", 1998). Pixels outside neither change nor take part. Cost: 49
+/// weights for each pixel.
 pub(crate) fn without_grain(picture: &ColorImage, inside: &[bool]) -> ColorImage {
     let [width, height] = picture.size;
     let pixels = (0..width * height).into_par_iter().map(|at| {

@@ -158,17 +158,13 @@ impl<'a> Search<'a> {
             basis_variance: 0.0,
             weights: vec![1.0; data.len()],
         };
-        let mut start = start;
-        let mut evaluations = 0;
+        let mut likelihood = Likelihood::new(problem, &data, &start, &state)?;
         // What a basis leaves is small and smooth, and of few samples the priors decide.
-        if problem.priors && problem.basis.is_none() && data.len() >= SEVERAL_STARTS {
-            evaluations = start.alternatives().count();
-            if let Some(point) = likeliest_start(problem, &data, &start, &state)? {
-                start.start_from(&point);
-            }
-        }
-        let found = maximise(problem, &data, &start, &state, problem.optimize)?;
-        evaluations += found.evaluations;
+        let several = problem.priors && problem.basis.is_none() && data.len() >= SEVERAL_STARTS;
+        let points = if several { start.alternatives() } else { Vec::new() };
+        let from = likelihood.likeliest(&points)?;
+        let found = likelihood.maximise(from, problem.optimize)?;
+        let evaluations = points.len() + found.evaluations;
         Ok(Self { problem, start, found, state, data, space, evaluations })
     }
 
@@ -194,7 +190,8 @@ impl<'a> Search<'a> {
                 break;
             }
             let converged = self.found.converged;
-            self.found = maximise(self.problem, &self.data, &self.start, &self.state, &later)?;
+            self.found = Likelihood::new(self.problem, &self.data, &self.start, &self.state)?
+                .maximise(None, &later)?;
             // Later searches only follow what has changed a little.
             self.found.converged |= converged;
             self.evaluations += self.found.evaluations;
@@ -280,43 +277,35 @@ impl<'a> Likelihood<'a> {
         gradient.iter_mut().for_each(|g| *g *= scale);
         Ok((scale * value, gradient))
     }
-}
 
-/// Maximises the likelihood.
-fn maximise(
-    problem: &Problem<'_>,
-    data: &Data,
-    start: &SearchStart,
-    state: &State,
-    options: &OptimizeOptions,
-) -> Result<Optimum> {
-    let mut likelihood = Likelihood::new(problem, data, start, state)?;
-    maximize(&start.parameters, data.len() * data.y.len(), options, |p| likelihood.at(p))
-}
-
-/// The most probable one of several starts: many samples with much noise have one optimum where the samples are rough
-/// and another, poorer one where nearly all of their variance is noise, and a search that begins with smooth functions
-/// and little noise may end in that one.
-fn likeliest_start(
-    problem: &Problem<'_>,
-    data: &Data,
-    start: &SearchStart,
-    state: &State,
-) -> Result<Option<Vec<f64>>> {
-    let mut likelihood = Likelihood::new(problem, data, start, state)?;
-    let mut best: Option<(f64, Vec<f64>)> = None;
-    for point in start.alternatives() {
-        let value = match likelihood.at(&point) {
-            Ok((value, _)) => value + log_prior(&start.parameters, &point, &mut []),
-            Err(Error::Cancelled) => return Err(Error::Cancelled),
-            // Where there is no likelihood, no search begins.
-            Err(_) => continue,
-        };
-        if value.is_finite() && best.as_ref().is_none_or(|(known, _)| *known < value) {
-            best = Some((value, point));
+    /// The most probable one of several points to start from, if there is a likelihood at any: many samples with much
+    /// noise have one optimum where they are rough and another, poorer one where nearly all of their variance is noise,
+    /// and a search that begins with smooth functions and little noise may end in that one.
+    fn likeliest<'p>(&mut self, points: &'p [Vec<f64>]) -> Result<Option<&'p [f64]>> {
+        let mut best: Option<(f64, &[f64])> = None;
+        for point in points {
+            let value = match self.at(point) {
+                Ok((value, _)) => value + log_prior(&self.start.parameters, point, &mut []),
+                Err(Error::Cancelled) => return Err(Error::Cancelled),
+                // Where there is no likelihood, no search begins.
+                Err(_) => continue,
+            };
+            if value.is_finite() && best.is_none_or(|(known, _)| known < value) {
+                best = Some((value, point));
+            }
         }
+        Ok(best.map(|(_, point)| point))
     }
-    Ok(best.map(|(_, point)| point))
+
+    /// Maximises the likelihood from these log-parameters, or from the usual ones.
+    fn maximise(mut self, from: Option<&[f64]>, options: &OptimizeOptions) -> Result<Optimum> {
+        let mut parameters = self.start.parameters.clone();
+        for (parameter, start) in parameters.iter_mut().zip(from.unwrap_or_default()) {
+            parameter.start = *start;
+        }
+        let targets = self.data.len() * self.data.y.len();
+        maximize(&parameters, targets, options, |p| self.at(p))
+    }
 }
 
 /// At most `count` of the indices `0..n`, evenly spaced, all where there are no more.
