@@ -1,11 +1,15 @@
 //! Bytes back from the device.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::mpsc;
+use std::time::Duration;
 
 use crate::context::Context;
 use crate::error::{Error, Result};
 
 const WHAT: &str = "reading back";
+
+/// How long the answer may take after the device is done.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 impl Context {
     /// The contents of a buffer with the usage `COPY_SRC`. Waits for the device.
@@ -49,23 +53,23 @@ impl Context {
     ) -> Result<Vec<u8>> {
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
         let staging = self.empty_buffer("read-back buffer", size, usage)?;
-        let answer: Arc<OnceLock<_>> = Arc::default();
-        let set = answer.clone();
+        let (answered, answer) = mpsc::sync_channel(1);
         self.guard(WHAT, || {
             let mut encoder =
                 self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             copy(&mut encoder, &staging);
             self.queue().submit([encoder.finish()]);
             staging.map_async(wgpu::MapMode::Read, .., move |result| {
-                let _set_once = set.set(result);
+                let _nobody_waits = answered.send(result);
             });
         })?;
         self.wait(WHAT)?;
         let failed = |message: String| Error::Gpu { what: WHAT.to_owned(), message };
-        match answer.get() {
-            Some(Ok(())) => {}
-            Some(Err(error)) => return Err(failed(error.to_string())),
-            None => return Err(failed("the device did not answer".to_owned())),
+        // Another thread that waits for the device may have to hand over the answer, which it does after its own wait.
+        match answer.recv_timeout(PATIENCE) {
+            Ok(Ok(())) => {}
+            Ok(Err(error)) => return Err(failed(error.to_string())),
+            Err(_) => return Err(failed("the device did not answer".to_owned())),
         }
         let bytes = staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?.to_vec();
         staging.unmap();
