@@ -136,10 +136,10 @@ fn a_truth_equals_itself() {
 #[test]
 fn samples_go_out_come_back_and_judge_a_model() {
     let cli = Cli::new();
-    cli.ok(&["convert", "phong", "s.csv", "--samples", "100"]);
+    cli.ok(&["convert", "cook-torrance", "s.csv", "--samples", "100"]);
     let written = read_samples_csv(cli.path("s.csv")).unwrap();
     assert!((75..=130).contains(&written.len()), "{}", written.len());
-    let truth = Source::built_in("phong").unwrap();
+    let truth = Source::built_in("cook-torrance").unwrap();
     for sample in written.iter() {
         let expected =
             truth.brdf().unwrap().eval_half_diff(HalfDiff::from_directions(&sample.wi, &sample.wo));
@@ -159,7 +159,7 @@ fn samples_go_out_come_back_and_judge_a_model() {
     assert_eq!((&report["solver"], &report["layout"]), (&"learned".into(), &"samples".into()));
     assert!(report["metrics"].is_null(), "samples have no table to compare with");
     assert_eq!(cli.names("out").len(), 6);
-    let against_table = cli.json(&["eval", "out/model.safetensors", "phong", "--json"]);
+    let against_table = cli.json(&["eval", "out/model.safetensors", "cook-torrance", "--json"]);
     assert!(metric(&against_table, "psnr_env") > 30.0, "{against_table:#}");
     let at_samples = cli.json(&["eval", "out/model.safetensors", "s.csv", "--json"]);
     assert_eq!(at_samples["metrics"]["samples"], written.len());

@@ -96,7 +96,8 @@ impl Belief {
 
     /// The factors by which variances at directions are larger than the process says: those of the intervals of a fit.
     pub(super) fn calibration(&self, angles: &[HalfDiff]) -> Vec<f64> {
-        let factor = |at| self.prior.as_ref().map_or(1.0, |prior| prior.calibration().of_variance(at));
+        let factor =
+            |at| self.prior.as_ref().map_or(1.0, |prior| prior.calibration().of_variance(self.space, at));
         angles.iter().map(factor).collect()
     }
 

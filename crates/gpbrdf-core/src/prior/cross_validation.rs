@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::Prior;
@@ -12,7 +13,7 @@ use crate::brdf::Rgb;
 use crate::brdf::angles::HalfDiff;
 use crate::model::{FitOptions, IntervalOf, PriorChoice, fit};
 use crate::sample::layout::hemisphere_directions;
-use crate::sample::{Sample, SampleSet};
+use crate::sample::{InPlaneScan, Sample, SampleSet};
 
 /// The number of parts of a library that are left out in turn.
 pub(super) const FOLDS: usize = 8;
@@ -20,9 +21,12 @@ pub(super) const FOLDS: usize = 8;
 /// The most materials that are predicted from few samples.
 const MOST_MATERIALS: usize = 48;
 
-/// The numbers of samples, and the seed of their directions.
+/// The numbers of scattered samples, and the seed of their directions.
 const SAMPLES: [usize; 2] = [20, 60];
 const SEED: u64 = 11;
+
+/// The number of samples in the plane of incidence.
+const IN_PLANE: usize = 120;
 
 /// The fewest materials outside a fold from which a prior for it is learned.
 const FEWEST_OTHERS: usize = 8;
@@ -44,45 +48,54 @@ pub(super) fn folds(names: &[String]) -> Vec<usize> {
     names.iter().map(|name| fold_of[family(name)]).collect()
 }
 
-/// Predicts materials of the library from few samples in random directions, with a prior that is learned from the other
-/// folds, and compares the errors at the centres with the standard deviations that the processes give. The library is
-/// too small for it where fewer than 8 materials are left to learn from: then nothing is calibrated.
+/// Predicts materials of the library from few samples, in random directions and in the plane of incidence, with a prior
+/// that is learned from the other folds, and compares the errors at the centres with the standard deviations that the
+/// processes give. The library is too small for it where fewer than 8 materials are left to learn from: then nothing is
+/// calibrated.
 pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<Calibration> {
     let folds = folds(library.names());
     let step = folds.len().div_ceil(MOST_MATERIALS).max(1);
-    let errors: Vec<Result<Vec<(HalfDiff, f64)>>> = (0..FOLDS)
+    let errors: Vec<Result<[Errors; 2]>> = (0..FOLDS)
         .into_par_iter()
         .map(|fold| {
             let own: Vec<usize> = (0..folds.len()).step_by(step).filter(|&i| folds[i] == fold).collect();
             let others = library.without_places(|i| folds[i] == fold);
             if own.is_empty() || others.names().len() < FEWEST_OTHERS {
-                return Ok(Vec::new());
+                return Ok(Default::default());
             }
             let prior = Arc::new(learn_functions("other folds", &others, options)?);
             let options = FitOptions { prior: PriorChoice::Learned(prior), ..FitOptions::default() };
-            let mut errors = Vec::new();
+            let mut errors: [Errors; 2] = Default::default();
             for i in own {
                 let truth = library.values_at(i, library.centres());
                 for count in SAMPLES {
-                    errors.extend(errors_of((library, i), &truth, count, &options)?);
+                    let pairs = hemisphere_directions(count, SEED + i as u64)?;
+                    errors[0].extend(errors_of((library, i), &truth, pairs, &options)?);
                 }
+                let pairs = InPlaneScan { count: IN_PLANE, ..InPlaneScan::default() }.directions()?;
+                errors[1].extend(errors_of((library, i), &truth, pairs, &options)?);
             }
             Ok(errors)
         })
         .collect();
-    let errors: Vec<(HalfDiff, f64)> = errors.into_iter().collect::<Result<Vec<_>>>()?.concat();
-    Ok(if errors.is_empty() { Calibration::NONE } else { Calibration::measured(&errors) })
+    let errors = errors.into_iter().collect::<Result<Vec<_>>>()?;
+    let all = |layout: usize| errors.iter().flat_map(|own| &own[layout]).copied().collect::<Errors>();
+    let (scattered, in_plane) = (all(0), all(1));
+    let is_empty = scattered.is_empty();
+    Ok(if is_empty { Calibration::NONE } else { Calibration::measured([&scattered, &in_plane]) })
 }
 
-/// The errors of a material's prediction from random directions, at the centres, where its values are `truth`, in
-/// standard deviations.
+/// Errors in standard deviations, each with its direction.
+type Errors = Vec<(HalfDiff, f64)>;
+
+/// The errors of a material's prediction from samples in these directions, at the centres, where its values are
+/// `truth`, in standard deviations.
 fn errors_of(
     (library, material): (&Library, usize),
     truth: &[Rgb],
-    count: usize,
+    pairs: Vec<[Vector3<f64>; 2]>,
     options: &FitOptions,
-) -> Result<Vec<(HalfDiff, f64)>> {
-    let pairs = hemisphere_directions(count, SEED + material as u64)?;
+) -> Result<Errors> {
     let angles: Vec<HalfDiff> = pairs.iter().map(|[wi, wo]| HalfDiff::from_directions(wi, wo)).collect();
     let values = library.values_at(material, &angles);
     let samples: SampleSet =

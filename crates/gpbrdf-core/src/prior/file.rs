@@ -19,7 +19,7 @@ pub(super) const BUILT_IN: &[u8] = include_bytes!("../../assets/prior.safetensor
 const KEY: &str = "gpbrdf_prior";
 
 /// The version of the format that is written, and the only one that is read.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// What is not a tensor.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -27,7 +27,8 @@ pub(crate) struct PriorHeader {
     version: u32,
     name: String,
     left: [f64; 2],
-    calibration: [f64; 4],
+    /// Of scattered samples, and of samples in the plane of incidence.
+    calibration: [[f64; 4]; 2],
     materials: Vec<String>,
 }
 

@@ -186,7 +186,7 @@ impl Library {
 ///
 /// What the functions leave of unknown materials is measured on the library itself, of which one eighth at a time is
 /// left out, and so is how much wider intervals must be than the process says; materials whose names begin with the
-/// same word ([`family`]) are left out together. Cost: `O(m^2 n)` for `m` materials known at `n` directions, and two
+/// same word ([`family`]) are left out together. Cost: `O(m^2 n)` for `m` materials known at `n` directions, and three
 /// fits of few samples for each of at most 48 materials. Numbers are rounded to single precision, as in files.
 ///
 /// # Errors

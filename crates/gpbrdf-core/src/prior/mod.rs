@@ -93,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "e18d51969258ada6a866ba488b8a35fd673116777e2b55e35115253cb136548c";
+    pub const BUILT_IN_SHA256: &str = "5602ba41808fb87f1243c29c242e942fd95c035c4ca2235a65bbdf2a68996b77";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]

@@ -237,7 +237,8 @@ impl Posterior for LearnedPosterior {
         let (bright, coloured) = (bright?, coloured?);
         let rows = bright.into_iter().zip(coloured).zip(angles);
         let calibration = self.prior.calibration();
-        Ok(rows.map(|((a, c), at)| calibration.of_variance(at) * variance_of_channels(a, c)).collect())
+        let space = self.space();
+        Ok(rows.map(|((a, c), at)| calibration.of_variance(space, at) * variance_of_channels(a, c)).collect())
     }
 
     fn hyper(&self) -> Option<Hyper> {

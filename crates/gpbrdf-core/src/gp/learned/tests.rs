@@ -85,7 +85,7 @@ fn predictions_are_those_of_the_kernel_with_a_basis() {
         for c in 0..3 {
             assert!((colours[c] - expected[0][j][c]).abs() < 1e-4, "{j}: {colours:?} {:?}", expected[0][j]);
         }
-        let calibration = prior.calibration().of_variance(&test[j]);
+        let calibration = prior.calibration().of_variance(hyper.space.unwrap(), &test[j]);
         assert!(calibration >= 1.0, "{calibration}");
         let variance = calibration * variance_of_channels(expected[1][j][0], expected[1][j][1]);
         assert!((variances[j][0] / variance - 1.0).abs() < 1e-3, "{j}: {} {variance}", variances[j][0]);
