@@ -18,11 +18,9 @@ mod table;
 
 use anyhow::Result;
 use clap::ValueEnum;
-use gpbrdf_core::gp::scattered_cost;
 
 use context::Outcome;
 pub(crate) use context::{Context, PAPER_MATERIALS, measurements};
-use paper_lattice::paper_cells;
 pub(crate) use prior::Materials;
 pub(crate) use simulate::{BATCHES, Simulation, Trained, Trial};
 
@@ -113,7 +111,7 @@ impl Experiment {
                 }
             }
             Self::Table2 => {
-                let whole = if quick { 0.0 } else { scattered_cost(paper_cells().len()).seconds };
+                let whole = if quick { 0.0 } else { materials::whole_seconds() };
                 paper * (dense + LATTICE + whole)
             }
             Self::Table3 => 6.0 * (dense + 2.0 * LATTICE),
