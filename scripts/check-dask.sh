@@ -12,8 +12,7 @@ scratch="$(mktemp -d)"
 trap 'rm -rf "$scratch"' EXIT
 
 python3 -m venv "$scratch/venv"
-"$scratch/venv/bin/pip" install --quiet dask==2026.1.1 distributed==2026.1.1 2>/dev/null ||
-  "$scratch/venv/bin/pip" install --quiet dask distributed
+"$scratch/venv/bin/pip" install --quiet dask==2026.8.0 distributed==2026.8.0
 options=(--lattice 10x8x6 --no-metrics --write binary,model)
 materials=(ward phong lambert cook-torrance red-plastic)
 "$program" --quiet batch "${materials[@]}" "${options[@]}" -o "$scratch/one" >"$scratch/one.jsonl"

@@ -11,7 +11,7 @@ trap 'rm -rf "$scratch"' EXIT
 
 python3 -m venv "$scratch/venv"
 python="$scratch/venv/bin/python"
-"$python" -m pip install --quiet "maturin>=1.9,<2" mypy pytest matplotlib
+"$python" -m pip install --quiet maturin==1.16.0 mypy==2.4.1 pytest==9.2.0 matplotlib==3.11.2
 "$python" -m maturin build --locked "$profile" -m crates/gpbrdf-python/Cargo.toml -i "$python" -o "$scratch/wheels"
 "$python" -m pip install --quiet "$scratch"/wheels/*.whl
 # Outside the project, so that the wheel is what is imported.

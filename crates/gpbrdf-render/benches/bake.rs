@@ -1,6 +1,6 @@
 //! What the processor prepares for the bake of a lattice model of 64 x 32 x 18 nodes, which needs no device, with new
 //! kernels and with those of a model before; and baking on the device until the texture is written: this model and a
-//! dense one, both RGB.
+//! dense one, both RGB; and giving two textures to a renderer.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use std::hint::black_box;
@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use criterion::{Criterion, criterion_group, criterion_main};
 use gpbrdf_core::gp::OptimizeOptions;
 use gpbrdf_core::{FitOptions, LatticeLayout, Layout, Model, Solver, Source, fit};
-use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision, Prepared};
+use gpbrdf_render::{AdapterChoice, Baker, BrdfTexture, Context, Precision, Prepared, Renderer};
 
 fn model(layout: &Layout, solver: Solver) -> Option<Model> {
     let source = Source::built_in("cherry-235").ok()?;
@@ -48,6 +48,11 @@ fn bake(c: &mut Criterion) {
         });
     }
     group.finish();
+    // Both textures are read back, and the densities made by which directions are drawn.
+    let Ok(mut renderer) = Renderer::new(&context, [64, 64]) else { return };
+    c.bench_function("change_two_materials", |b| {
+        b.iter(|| renderer.set_materials(Some(&texture), &texture).is_ok());
+    });
 }
 
 criterion_group!(benches, bake);

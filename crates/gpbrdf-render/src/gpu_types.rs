@@ -79,7 +79,7 @@ pub(crate) struct Shade {
     /// Nothing is reflected where either cosine is smaller.
     pub(crate) min_cosine: f32,
     /// The share of the directions drawn from the BRDF that are drawn by the cosine instead.
-    pub(crate) cosine_share: f32,
+    pub(crate) padding: u32,
 }
 
 /// The `SHOW_*` of `scene/display.wgsl`.

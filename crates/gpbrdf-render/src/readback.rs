@@ -41,8 +41,13 @@ impl Context {
             let target = wgpu::TexelCopyBufferInfo { buffer, layout };
             encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
         })?;
-        let lines = bytes.chunks_exact(row).flat_map(|row| row[..line].chunks_exact(size_of::<T>()));
-        Ok(lines.map(bytemuck::pod_read_unaligned).collect())
+        let mut texels = vec![T::zeroed(); bytes.len() / row * texture.width() as usize];
+        for (to, from) in
+            bytemuck::cast_slice_mut(&mut texels).chunks_exact_mut(line).zip(bytes.chunks_exact(row))
+        {
+            to.copy_from_slice(&from[..line]);
+        }
+        Ok(texels)
     }
 
     /// Records a copy to a buffer of `size` bytes, submits it and waits for the bytes.

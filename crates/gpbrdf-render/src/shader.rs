@@ -15,7 +15,6 @@ mod part {
     pub(super) const MATERIAL_EXACT: &str = include_str!("../shaders/shared/material_exact.wgsl");
     pub(super) const MATERIAL_FILTERED: &str = include_str!("../shaders/shared/material_filtered.wgsl");
     pub(super) const RANDOM: &str = include_str!("../shaders/shared/random.wgsl");
-    pub(super) const RINGS: &str = include_str!("../shaders/shared/rings.wgsl");
     pub(super) const SEARCH: &str = include_str!("../shaders/shared/search.wgsl");
     pub(super) const SUMS: &str = include_str!("../shaders/shared/sums.wgsl");
     pub(super) const VIEW: &str = include_str!("../shaders/shared/view.wgsl");
@@ -27,7 +26,6 @@ mod part {
     pub(super) const SHAPES: &str = include_str!("../shaders/bake/shapes.wgsl");
     pub(super) const DISPLAY: &str = include_str!("../shaders/scene/display.wgsl");
     pub(super) const GBUFFER: &str = include_str!("../shaders/scene/gbuffer.wgsl");
-    pub(super) const SAMPLER: &str = include_str!("../shaders/scene/sampler.wgsl");
     pub(super) const SHADE: &str = include_str!("../shaders/scene/shade.wgsl");
 }
 
@@ -48,8 +46,9 @@ macro_rules! lookup {
 pub const LOOKUP_WGSL: &str = lookup!();
 
 /// [`LOOKUP_WGSL`] and the functions `gpbrdf_eval(table, wi, wo)`, `gpbrdf_sample(table, wo, u)` and
-/// `gpbrdf_pdf(wi, wo)`, which do what [`Material`](gpbrdf_core::Material) does. The text needs one more function,
-/// which reads the buffer of [`density_buffer`](crate::density_buffer):
+/// `gpbrdf_pdf(wi, wo)`, which do what [`Material`](gpbrdf_core::Material) does, and `gpbrdf_direction(wo, u)`, which
+/// draws without a lookup. The text needs one more function, which reads the buffer of
+/// [`density_buffer`](crate::density_buffer):
 ///
 /// ```wgsl
 /// @group(0) @binding(1) var<storage, read> densities: array<f32>;
@@ -119,15 +118,10 @@ pub(crate) fn gbuffer() -> String {
     compose(&[part::VIEW, part::GBUFFER], &[])
 }
 
-/// Entry point `half_vector_shares`.
-pub(crate) fn sampler(lookup: Lookup) -> String {
-    compose(&[LOOKUP_WGSL, lookup.part(), part::RINGS, part::COLOUR, part::SAMPLER], &[])
-}
-
 /// Entry point `shade_pixels`.
 pub(crate) fn shade(lookup: Lookup) -> String {
-    let shared = [part::RINGS, part::SEARCH, part::RANDOM, part::COLOUR, part::ENVIRONMENT, part::SUMS];
-    compose(&[&[LOOKUP_WGSL, lookup.part()], &shared[..], &[part::SHADE]].concat(), &[])
+    let shared = [part::SEARCH, part::RANDOM, part::COLOUR, part::ENVIRONMENT, part::SUMS];
+    compose(&[&[MATERIAL_WGSL, lookup.part()], &shared[..], &[part::SHADE]].concat(), &[])
 }
 
 /// Entry point `display_pixels`.

@@ -1,10 +1,12 @@
 //! A BRDF as a 3-D texture.
 
 use gpbrdf_core::base::to_halves;
-use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H, cell_index};
+use gpbrdf_core::brdf::{N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
 use gpbrdf_core::formats::texels;
 use gpbrdf_core::{BrdfTable, SigmaTable};
 use half::f16;
+use half::slice::HalfFloatSliceExt as _;
+use rayon::prelude::*;
 
 use crate::context::Context;
 use crate::error::Result;
@@ -119,7 +121,7 @@ impl BrdfTexture {
         Ok(out)
     }
 
-    /// The texels in the order of a table's cells ([`cell_index`]): red, green, blue, sigma. Waits for the
+    /// The texels in the order of a table's cells ([`gpbrdf_core::brdf::cell_index`]): red, green, blue, sigma. Waits for the
     /// device.
     ///
     /// # Errors
@@ -127,16 +129,21 @@ impl BrdfTexture {
     pub fn download(&self, context: &Context) -> Result<Vec<[f32; 4]>> {
         let texels: Vec<[f32; 4]> = match self.precision {
             Precision::Half => {
-                let texels: Vec<[f16; 4]> = context.read_texture(&self.texture)?;
-                texels.into_iter().map(|texel| texel.map(f16::to_f32)).collect()
+                let halves: Vec<[f16; 4]> = context.read_texture(&self.texture)?;
+                let mut texels = vec![[0.0; 4]; halves.len()];
+                halves.as_flattened().convert_to_f32_slice(texels.as_flattened_mut());
+                texels
             }
             Precision::Single => context.read_texture(&self.texture)?,
         };
         let mut cells = vec![[0.0; 4]; N_CELLS];
-        for (i, texel) in texels.into_iter().enumerate() {
-            let (line, h) = (i / N_THETA_H, i % N_THETA_H);
-            cells[cell_index(h, line % N_THETA_D, line / N_THETA_D)] = texel;
-        }
+        cells.par_chunks_mut(N_THETA_D * N_PHI_D).enumerate().for_each(|(h, slab)| {
+            for (d, line) in slab.chunks_mut(N_PHI_D).enumerate() {
+                for (p, cell) in line.iter_mut().enumerate() {
+                    *cell = texels[(p * N_THETA_D + d) * N_THETA_H + h];
+                }
+            }
+        });
         Ok(cells)
     }
 
@@ -186,7 +193,7 @@ impl BrdfTexture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gpbrdf_core::brdf::direction;
+    use gpbrdf_core::brdf::{cell_index, direction};
     use gpbrdf_core::{Brdf as _, HalfDiff};
 
     crate::support::gpu_tests![

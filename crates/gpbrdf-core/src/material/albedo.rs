@@ -168,14 +168,18 @@ fn outgoing(cosine: f32) -> [f32; 3] {
 
 /// The densities from which directions are drawn: at each node the mean of `luminance(f) cos theta_i` per unit of the
 /// square over the cells about it, weighted by the node's bilinear function, from both sides of the plane of incidence.
-pub(crate) fn densities(values: &[[f32; 3]], reflected_light: &Reflected) -> DirectionDensities {
-    let squares: Vec<Vec<f32>> =
-        (0..VIEWS).into_par_iter().map(|k| square_at(values, reflected_light, k)).collect();
+///
+/// `scaled` is what becomes of a value of the table at the cosines of `theta_i` and `theta_o`.
+pub(crate) fn densities(
+    values: &[[f32; 3]],
+    scaled: impl Fn([f32; 3], f32, f32) -> [f32; 3] + Sync,
+) -> DirectionDensities {
+    let squares: Vec<Vec<f32>> = (0..VIEWS).into_par_iter().map(|k| square_at(values, &scaled, k)).collect();
     DirectionDensities::new(squares.concat())
 }
 
 /// The values of one square of [`densities`], up to a factor.
-fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<f32> {
+fn square_at(values: &[[f32; 3]], scaled: &impl Fn([f32; 3], f32, f32) -> [f32; 3], k: usize) -> Vec<f32> {
     let wo = outgoing(view_cosine(k, VIEWS));
     let square = HalfVectorSquare::new(wo);
     let luminance = |f: [f32; 3]| -> f64 { (0..3).map(|c| LUMINANCE_WEIGHTS[c] * f64::from(f[c])).sum() };
@@ -191,7 +195,7 @@ fn square_at(values: &[[f32; 3]], reflected_light: &Reflected, k: usize) -> Vec<
         let mut value = 0.0;
         for side in [-1.0, 1.0] {
             if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {
-                let f = reflected_light.conserve(f, cosine, wo[2]);
+                let f = scaled(f, cosine, wo[2]);
                 value += luminance(f) * f64::from(cosine / per_steradian);
             }
         }

@@ -100,12 +100,9 @@ impl Material {
             Cow::Owned(filled) => Some(filled),
         };
         let table = filled.unwrap_or(table);
-        if let Some(cell) = table.values().iter().position(|f| f.iter().any(|x| !x.is_finite())) {
-            let found = format!("{:?} in cell {cell}", table.values()[cell]);
-            return Err(Error::argument("values of a table", "finite numbers", found));
-        }
+        check_finite(&table)?;
         let reflected = Reflected::new(table.values(), options.energy_conserving);
-        let densities = albedo::densities(table.values(), &reflected);
+        let densities = albedo::densities(table.values(), |f, i, o| reflected.conserve(f, i, o));
         Ok(Self { table, densities, reflected })
     }
 
@@ -258,6 +255,14 @@ impl Material {
     pub fn conserving_factors(&self) -> Option<&[f32]> {
         self.reflected.factors()
     }
+}
+
+fn check_finite(table: &BrdfTable) -> Result<()> {
+    let Some(cell) = table.values().iter().position(|f| f.iter().any(|x| !x.is_finite())) else {
+        return Ok(());
+    };
+    let found = format!("{:?} in cell {cell}", table.values()[cell]);
+    Err(Error::argument("values of a table", "finite numbers", found))
 }
 
 #[cfg(test)]

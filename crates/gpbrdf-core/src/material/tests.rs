@@ -51,6 +51,16 @@ fn values_are_those_of_the_table_in_double_precision() {
 }
 
 #[test]
+fn densities_of_a_table_are_those_of_its_material() {
+    let table = table_of("cook-torrance");
+    let found = DirectionDensities::of_table(&table).unwrap();
+    assert_eq!(&found, made(table).densities());
+    let mut values = table_of("lambert").values().to_vec();
+    values[5][1] = f32::INFINITY;
+    assert!(DirectionDensities::of_table(&BrdfTable::from_values(values).unwrap()).is_err());
+}
+
+#[test]
 fn the_right_cells_are_read() {
     // Neighbours of a random table have nothing in common.
     let mut random = crate::base::SplitMix64::new(7);

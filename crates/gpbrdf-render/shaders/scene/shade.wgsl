@@ -22,8 +22,7 @@ struct Shade {
     single_material: u32,
     // Nothing is reflected where either cosine is smaller.
     min_cosine: f32,
-    // The share of the directions drawn from the BRDF that are drawn by the cosine instead.
-    cosine_share: f32,
+    padding: u32,
 }
 
 const LIGHT_DIRECTIONAL: u32 = 0u;
@@ -43,21 +42,19 @@ const SAMPLE_BOTH: u32 = 2u;
 @group(0) @binding(5) var environment: texture_2d<f32>;
 // Running shares of the rows, then of the pixels of each row.
 @group(0) @binding(6) var<storage, read> environment_shares: array<f32>;
-// sin^2(theta_h / 2) at the edges of the rings.
-@group(0) @binding(7) var<storage, read> edges: array<f32>;
-// [view bin][RINGS + 1] running shares.
-@group(0) @binding(8) var<storage, read> ring_shares: array<f32>;
+// What both materials reflect together, as shared/directions.wgsl wants it.
+@group(0) @binding(7) var<storage, read> densities: array<f32>;
 // [row][column].
-@group(0) @binding(9) var<storage, read_write> sums: array<PixelSums>;
+@group(0) @binding(8) var<storage, read_write> sums: array<PixelSums>;
 
-// The series of shared/search.wgsl.
+fn gpbrdf_density(index: u32) -> f32 {
+    return densities[index];
+}
+
+// The only series of shared/search.wgsl.
 const ENVIRONMENT_SHARES: u32 = 0u;
-const RING_SHARES: u32 = 1u;
 
 fn ascending(series: u32, i: u32) -> f32 {
-    if series == RING_SHARES {
-        return ring_shares[i];
-    }
     return environment_shares[i];
 }
 
@@ -67,8 +64,6 @@ struct Surface {
     bitangent: vec3f,
     normal: vec3f,
     wo: vec3f,
-    // Where the running shares of its view angle begin in `ring_shares`.
-    first_share: u32,
 }
 
 struct Reflected {
@@ -88,8 +83,6 @@ fn make_surface(normal: vec3f, to_viewer: vec3f) -> Surface {
     surface.bitangent = vec3f(b, sign + normal.y * normal.y * a, -normal.y);
     surface.normal = normal;
     surface.wo = to_local(surface, to_viewer);
-    let theta_o = gpbrdf_atan2(length(surface.wo.xy), surface.wo.z);
-    surface.first_share = first_share_of(view_bin_of(theta_o));
     return surface;
 }
 
@@ -124,37 +117,6 @@ fn environment_towards(w: vec3f) -> vec4f {
     return textureLoad(environment, min(at, shade.environment_size - 1u), 0);
 }
 
-// The density, in 1/sr, with which `brdf_direction` draws wi.
-fn brdf_density(surface: Surface, wi: vec3f) -> f32 {
-    let sum = wi + surface.wo;
-    let h = sum / max(length(sum), 1e-20);
-    let cosine = dot(surface.wo, h);
-    // sin^2(theta_h / 2) without cancellation.
-    let s = dot(h.xy, h.xy) / (2.0 * (1.0 + h.z));
-    let theta_h = 2.0 * gpbrdf_atan2(sqrt(s), sqrt(max(1.0 - s, 0.0)));
-    let ring = ring_of(theta_h);
-    let first = surface.first_share + ring;
-    let share = ring_shares[first + 1u] - ring_shares[first];
-    let solid_angle = 4.0 * GPBRDF_PI * (edges[ring + 1u] - edges[ring]);
-    let by_half_vector = share / (solid_angle * 4.0 * max(cosine, 1e-6));
-    return mix(by_half_vector, max(wi.z, 0.0) / GPBRDF_PI, shade.cosine_share);
-}
-
-// Draws a direction: by the cosine, or as the mirror image of wo about a half vector, which is drawn from the
-// distribution of the view angle.
-fn brdf_direction(surface: Surface, point: vec2f) -> vec3f {
-    let azimuth = 2.0 * GPBRDF_PI * point.y;
-    let around = vec2f(cos(azimuth), sin(azimuth));
-    if point.x < shade.cosine_share {
-        let square = point.x / shade.cosine_share;
-        return vec3f(sqrt(square) * around, sqrt(1.0 - square));
-    }
-    let share = (point.x - shade.cosine_share) / (1.0 - shade.cosine_share);
-    let place = find_place(RING_SHARES, surface.first_share, RINGS, share);
-    let s = mix(edges[place.interval], edges[place.interval + 1u], place.within);
-    return normalize(mirrored(surface.wo, half_vector_at(s, around)));
-}
-
 // Adds one sample of the light of the environment. SAMPLE_BOTH draws one direction from the light and one
 // from the BRDF and weights both by the balance heuristic of E. Veach and L. Guibas, "Optimally Combining
 // Sampling Techniques" (1995), which here amounts to dividing by the sum of the densities.
@@ -174,22 +136,20 @@ fn environment_sample(sum: Reflected, surface: Surface, pixel: vec2u, index: u32
         var density = light.a;
         if wi.z > 0.0 && density > 0.0 {
             if shade.sampling == SAMPLE_BOTH {
-                density += brdf_density(surface, wi);
+                density += gpbrdf_pdf(wi, surface.wo);
             }
             out = reflect_light(out, surface, wi, light.rgb / density);
         }
     }
     if shade.sampling != SAMPLE_LIGHT {
-        let wi = brdf_direction(surface, low_discrepancy(pixel, 2u, index));
-        if wi.z > 0.0 {
-            var density = brdf_density(surface, wi);
-            let light = environment_towards(to_world(surface, wi));
+        let drawn = gpbrdf_direction(surface.wo, low_discrepancy(pixel, 2u, index));
+        if drawn.pdf > 0.0 {
+            let light = environment_towards(to_world(surface, drawn.wi));
+            var density = drawn.pdf;
             if shade.sampling == SAMPLE_BOTH {
                 density += light.a;
             }
-            if density > 0.0 {
-                out = reflect_light(out, surface, wi, light.rgb / density);
-            }
+            out = reflect_light(out, surface, drawn.wi, light.rgb / density);
         }
     }
     return out;

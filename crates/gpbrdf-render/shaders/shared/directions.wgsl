@@ -18,8 +18,13 @@ const GPBRDF_CONDITIONAL: u32 = GPBRDF_VIEWS * GPBRDF_ROWS * GPBRDF_COLUMNS;
 const GPBRDF_MARGINAL: u32 = 2u * GPBRDF_CONDITIONAL;
 const GPBRDF_LEAST: f32 = 1e-37;
 
-// A direction to the light, `f cos theta_i / pdf` and the density over solid angle in 1/sr, which is 0 where there is
-// no direction.
+// A direction to the light, and its density over solid angle in 1/sr, which is 0 where there is no direction.
+struct GpbrdfDirection {
+    wi: vec3f,
+    pdf: f32,
+}
+
+// The same with the weight `f cos theta_i / pdf`.
 struct GpbrdfSample {
     wi: vec3f,
     pdf: f32,
@@ -230,8 +235,8 @@ fn gpbrdf_pdf(wi: vec3f, wo: vec3f) -> f32 {
 }
 
 // A direction to the light drawn by two numbers that are uniform on [0, 1). Its density is 0 where there is none.
-fn gpbrdf_sample(table: texture_3d<f32>, wo: vec3f, u: vec2f) -> GpbrdfSample {
-    var none = GpbrdfSample(vec3f(0.0, 0.0, 1.0), 0.0, vec3f(0.0));
+fn gpbrdf_direction(wo: vec3f, u: vec2f) -> GpbrdfDirection {
+    let none = GpbrdfDirection(vec3f(0.0, 0.0, 1.0), 0.0);
     if wo.z <= 0.0 {
         return none;
     }
@@ -276,6 +281,15 @@ fn gpbrdf_sample(table: texture_3d<f32>, wo: vec3f, u: vec2f) -> GpbrdfSample {
     if wi.z <= 0.0 {
         return none;
     }
-    let pdf = gpbrdf_mixed(of_table, wi.z);
-    return GpbrdfSample(wi, pdf, gpbrdf_eval(table, wi, wo) * (wi.z / pdf));
+    return GpbrdfDirection(wi, gpbrdf_mixed(of_table, wi.z));
+}
+
+// `gpbrdf_direction` with the weight of the table.
+fn gpbrdf_sample(table: texture_3d<f32>, wo: vec3f, u: vec2f) -> GpbrdfSample {
+    let drawn = gpbrdf_direction(wo, u);
+    var weight = vec3f(0.0);
+    if drawn.pdf > 0.0 {
+        weight = gpbrdf_eval(table, drawn.wi, wo) * (drawn.wi.z / drawn.pdf);
+    }
+    return GpbrdfSample(drawn.wi, drawn.pdf, weight);
 }

@@ -9,6 +9,5 @@ pub(crate) mod light;
 pub(crate) mod mesh;
 pub(crate) mod mesh_file;
 pub(crate) mod renderer;
-pub(crate) mod sampler;
 pub(crate) mod shade;
 pub(crate) mod twin;

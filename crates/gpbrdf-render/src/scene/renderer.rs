@@ -262,7 +262,8 @@ impl Renderer {
     }
 
     /// Changes the materials: a prediction, with its sigma in alpha, and a truth to compare it with, if there
-    /// is one. The textures are shared, not copied; call this again after writing to them.
+    /// is one. The textures are shared, not copied; call this again after writing to them. Directions are drawn by what
+    /// the materials reflect, for which they are read back: some 50 ms, in which this waits for the device.
     ///
     /// # Errors
     /// Those of [`Context::guard`].
@@ -282,9 +283,8 @@ impl Renderer {
         if options.exact_lookup != self.options.exact_lookup
             && let Some(materials) = &self.materials
         {
-            let (truth, prediction) = materials.textures();
             let exact = options.exact_lookup;
-            self.materials = Some(Materials::new(&self.context, &self.shader, truth, prediction, exact)?);
+            self.materials = Some(materials.looked_up(&self.context, &self.shader, exact)?);
         }
         if options != self.options {
             self.options = options;

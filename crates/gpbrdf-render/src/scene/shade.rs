@@ -3,15 +3,18 @@
 use std::sync::OnceLock;
 
 use bytemuck::NoUninit;
+use gpbrdf_core::BrdfTable;
 use gpbrdf_core::base::Raster;
+use gpbrdf_core::material::DirectionDensities;
+use rayon::prelude::*;
 
 use super::camera::{Camera, Projection};
 use super::gbuffer::GBuffer;
 use super::light::Light;
-use super::sampler::HalfVectorShares;
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::gpu_types::{LightKind, Shade};
+use crate::material::density_buffer;
 use crate::shader::{self, Lookup, MATERIAL_SAMPLER};
 use crate::texture::BrdfTexture;
 
@@ -23,7 +26,7 @@ const WHAT: &str = "shading";
 pub enum Sampling {
     /// By the luminance of the light: best for matte materials.
     Light,
-    /// By the light that half vectors reflect, mixed with a cosine lobe: best for glossy materials.
+    /// By the light that the materials reflect, as [`gpbrdf_core::Material::sample`] does: best for glossy materials.
     Brdf,
     /// One direction from each of the two, weighted by the balance heuristic.
     #[default]
@@ -77,9 +80,6 @@ impl ShadingOptions {
         Err(Error::argument("least cosine", "a number in [0, 1)", self.min_cosine))
     }
 }
-
-/// The share of the directions of [`Sampling::Brdf`] that are drawn by the cosine.
-const COSINE_SHARE: f32 = 0.3;
 
 /// Pixels times samples of one dispatch, which take about 10 ms on a modest GPU and on a processor.
 const HARDWARE_BUDGET: u64 = 1 << 21;
@@ -156,7 +156,8 @@ pub(crate) struct Materials {
     truth: BrdfTexture,
     prediction: BrdfTexture,
     single: bool,
-    shares: HalfVectorShares,
+    /// What both reflect together, so that one set of directions serves both: see [`density_buffer`].
+    densities: wgpu::Buffer,
     lookup: Lookup,
     pipeline: wgpu::ComputePipeline,
 }
@@ -171,12 +172,10 @@ impl Materials {
         exact: bool,
     ) -> Result<Self> {
         let other = truth.unwrap_or(prediction);
-        let filterable = prediction.is_filterable(context) && other.is_filterable(context);
-        let lookup = if filterable && !exact { Lookup::Filtered } else { Lookup::Exact };
-        let Pipelines { shade, shares } = shader.pipelines(context, lookup)?;
+        let lookup = lookup_of(context, [prediction, other], exact);
         Ok(Self {
-            shares: HalfVectorShares::new(context, shares, other, prediction, lookup)?,
-            pipeline: shade.clone(),
+            densities: densities_of(context, truth, prediction)?,
+            pipeline: shader.pipeline(context, lookup)?.clone(),
             truth: other.clone(),
             prediction: prediction.clone(),
             single: truth.is_none(),
@@ -184,24 +183,49 @@ impl Materials {
         })
     }
 
-    pub(crate) fn textures(&self) -> (Option<&BrdfTexture>, &BrdfTexture) {
-        ((!self.single).then_some(&self.truth), &self.prediction)
+    /// The same materials with the other kind of lookup, where the device has it.
+    pub(crate) fn looked_up(&self, context: &Context, shader: &Shader, exact: bool) -> Result<Self> {
+        let lookup = lookup_of(context, [&self.prediction, &self.truth], exact);
+        let pipeline = shader.pipeline(context, lookup)?.clone();
+        let (truth, prediction) = (self.truth.clone(), self.prediction.clone());
+        Ok(Self {
+            truth,
+            prediction,
+            single: self.single,
+            densities: self.densities.clone(),
+            lookup,
+            pipeline,
+        })
     }
 }
 
-/// The pipelines of one kind of lookup.
-#[derive(Debug)]
-struct Pipelines {
-    shade: wgpu::ComputePipeline,
-    /// For [`HalfVectorShares`].
-    shares: wgpu::ComputePipeline,
+fn lookup_of(context: &Context, textures: [&BrdfTexture; 2], exact: bool) -> Lookup {
+    let are_filterable = textures.iter().all(|texture| texture.is_filterable(context));
+    if are_filterable && !exact { Lookup::Filtered } else { Lookup::Exact }
+}
+
+/// The densities of what a prediction and a truth reflect together. Waits for the device.
+fn densities_of(
+    context: &Context,
+    truth: Option<&BrdfTexture>,
+    prediction: &BrdfTexture,
+) -> Result<wgpu::Buffer> {
+    let mut texels = prediction.download(context)?;
+    if let Some(truth) = truth {
+        let others = truth.download(context)?;
+        texels.par_iter_mut().zip(others).for_each(|(sum, other)| (0..3).for_each(|c| sum[c] += other[c]));
+    }
+    // What a device makes of a value that is too large must not spoil the others.
+    let usable = |x: f32| if x.is_finite() { x } else { 0.0 };
+    let values = texels.into_par_iter().map(|[r, g, b, _]| [r, g, b].map(usable)).collect();
+    density_buffer(context, &DirectionDensities::of_table(&BrdfTable::from_values(values)?)?)
 }
 
 /// The pipelines of both kinds of lookup, each made when it is first needed, and the uniform they share.
 #[derive(Debug)]
 pub(crate) struct Shader {
-    exact: OnceLock<Pipelines>,
-    filtered: OnceLock<Pipelines>,
+    exact: OnceLock<wgpu::ComputePipeline>,
+    filtered: OnceLock<wgpu::ComputePipeline>,
     uniform: wgpu::Buffer,
     sampler: wgpu::Sampler,
 }
@@ -234,18 +258,15 @@ impl Shader {
         })
     }
 
-    fn pipelines(&self, context: &Context, lookup: Lookup) -> Result<&Pipelines> {
+    fn pipeline(&self, context: &Context, lookup: Lookup) -> Result<&wgpu::ComputePipeline> {
         let known = match lookup {
             Lookup::Exact => &self.exact,
             Lookup::Filtered => &self.filtered,
         };
-        if let Some(pipelines) = known.get() {
-            return Ok(pipelines);
+        if let Some(pipeline) = known.get() {
+            return Ok(pipeline);
         }
-        let made = Pipelines {
-            shade: context.compute_pipeline(WHAT, &shader::shade(lookup), "shade_pixels")?,
-            shares: HalfVectorShares::pipeline(context, lookup)?,
-        };
+        let made = context.compute_pipeline(WHAT, &shader::shade(lookup), "shade_pixels")?;
         Ok(known.get_or_init(|| made))
     }
 
@@ -277,9 +298,8 @@ impl Shader {
             (4, TextureView(job.materials.prediction.view())),
             (5, TextureView(&job.environment.view)),
             (6, job.environment.shares.as_entire_binding()),
-            (7, job.materials.shares.edges.as_entire_binding()),
-            (8, job.materials.shares.shares.as_entire_binding()),
-            (9, job.sums.as_entire_binding()),
+            (7, job.materials.densities.as_entire_binding()),
+            (8, job.sums.as_entire_binding()),
         ];
         if job.materials.lookup == Lookup::Filtered {
             resources.push((MATERIAL_SAMPLER, Sampler(&self.sampler)));
@@ -313,6 +333,6 @@ fn uniform_of(job: &Job<'_>) -> Shade {
         sampling: job.options.sampling,
         single_material: u32::from(job.materials.single),
         min_cosine: job.options.min_cosine,
-        cosine_share: COSINE_SHARE,
+        padding: 0,
     }
 }

@@ -13,7 +13,6 @@ use crate::gpu_types::{
 };
 use crate::scene::colour::LUMINANCE_WEIGHTS;
 use crate::scene::display::{Background, COLOUR_MAPS, Encoding, ToneCurve};
-use crate::scene::sampler::VIEW_BINS;
 use crate::scene::shade::Sampling;
 
 /// A composed shader: its name, its source and the module.
@@ -32,8 +31,6 @@ fn variants() -> Vec<Variant> {
         ("material", format!("{densities}{MATERIAL_WGSL}")),
         ("evaluate", evaluate_wgsl()),
         ("gbuffer", gbuffer()),
-        ("sampler, exact", sampler(Lookup::Exact)),
-        ("sampler, filtered", sampler(Lookup::Filtered)),
         ("shade, exact", shade(Lookup::Exact)),
         ("shade, filtered", shade(Lookup::Filtered)),
         ("display", display()),
@@ -123,7 +120,7 @@ fn structs_are_laid_out_as_in_wgsl() {
         layout!(View: clip_from_world, eye, right, up, forward, size, jitter),
         layout!(PixelSums: truth, hits, prediction, weighted_sigma),
         layout!(Shade: viewer, light, strength, size, environment_size, first_row, first_sample, sample_count,
-            light_kind, sampling, single_material, min_cosine, cosine_share),
+            light_kind, sampling, single_material, min_cosine, padding),
         layout!(Display: size, environment_size, show, tone, encoding, background, samples, exposure, limit,
             split, ground_size, ground_half, ground_height, horizon),
         layout!(Separable: shape, first, third, second, pieces, signal_variance, second_prior, limit, share;
@@ -185,8 +182,6 @@ fn mirrored() -> BTreeMap<&'static str, Vec<f64>> {
         ("N_THETA_D", single(gpbrdf_core::brdf::N_THETA_D)),
         ("N_PHI_D", single(gpbrdf_core::brdf::N_PHI_D)),
         ("N_COLUMNS", single(gpbrdf_core::brdf::N_PHI_D / 2)),
-        ("RINGS", single(gpbrdf_core::brdf::N_THETA_H)),
-        ("VIEW_BINS", single(VIEW_BINS as usize)),
         ("TILE", single(kernel_sum_bake::TILE)),
         ("LUMINANCE_WEIGHTS", LUMINANCE_WEIGHTS.map(|x| f64::from(crate::gpu_types::narrow(x))).to_vec()),
         ("LIGHT_DIRECTIONAL", single(LightKind::Directional as usize)),
@@ -218,12 +213,11 @@ fn mirrored() -> BTreeMap<&'static str, Vec<f64>> {
 }
 
 /// The constants that only WGSL knows, or that Rust composes.
-const WGSL_ONLY: [&str; 11] = [
+const WGSL_ONLY: [&str; 10] = [
     "ENVIRONMENT_SHARES",
     "GPBRDF_CONDITIONAL",
     "GPBRDF_LEAST",
     "GPBRDF_MARGINAL",
-    "RING_SHARES",
     "LEAST_COSINE",
     "NEUTRAL",
     "PARAMETERS",
