@@ -121,8 +121,8 @@ impl BrdfTexture {
         Ok(out)
     }
 
-    /// The texels in the order of a table's cells ([`gpbrdf_core::brdf::cell_index`]): red, green, blue, sigma. Waits for the
-    /// device.
+    /// The texels in the order of a table's cells ([`gpbrdf_core::brdf::cell_index`]): red, green, blue, sigma. Waits
+    /// for the device.
     ///
     /// # Errors
     /// Those of [`Context::guard`].
