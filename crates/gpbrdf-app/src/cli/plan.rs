@@ -113,7 +113,7 @@ struct Simulate {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Instrument")]
 pub(crate) struct Instrument {
-    /// Step of all angles, degrees.
+    /// Step of all angles, degrees. Plans of a hundred directions and more resolve sharp highlights better with 1.
     #[arg(long, value_name = "DEGREES", default_value_t = Device::default().step, allow_hyphen_values = true)]
     step: f64,
     /// Angles between light and normal, degrees. [default: all steps up to --theta-max]

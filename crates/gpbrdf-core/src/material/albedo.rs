@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::base::simd::index;
+use crate::base::simd::{index, vectorized};
 use crate::brdf::LUMINANCE_WEIGHTS;
 use crate::material::density::{
     COLUMNS, DirectionDensities, ROWS, VIEWS, column_node, row_node, view_between, view_cosine,
@@ -14,10 +14,17 @@ use crate::material::lookup::{Cells, interpolate};
 pub const ALBEDO_VIEWS: usize = 128;
 
 /// Points along the rows and the columns of the square over which an albedo is integrated.
-const QUADRATURE: [usize; 2] = [192, 64];
+const INTEGRATION_ROWS: usize = 192;
+const INTEGRATION_COLUMNS: usize = 64;
 
 /// Points along each side of a cell whose values make those of its nodes.
 const CELL_POINTS: usize = 2;
+
+/// Such points along a row of a square.
+const ROW_POINTS: usize = (COLUMNS - 1) * CELL_POINTS;
+
+/// The sides of the plane of incidence.
+const SIDES: [f32; 2] = [-1.0, 1.0];
 
 /// Rounds in which the factors of an energy-conserving material are found. The last one is followed by a scaling that
 /// makes the bound hold whatever is left.
@@ -118,47 +125,68 @@ fn conserving_factors(transport: &Transport) -> Option<Vec<f64>> {
 fn from_elevation(values: &[[f32; 3]], k: usize) -> Vec<[f64; 3]> {
     let wo = outgoing(view_cosine(k, ALBEDO_VIEWS));
     let square = HalfVectorSquare::new(wo);
-    let [rows, columns] = QUADRATURE;
+    let columns = std::array::from_fn(|i| (i as f32 + 0.5) / INTEGRATION_COLUMNS as f32);
     let mut sums = vec![[0.0; 3]; ALBEDO_VIEWS];
-    for j in 0..rows {
-        // y = t^4, so dy = 4 t^3 dt.
-        let t = (j as f32 + 0.5) / rows as f32;
-        let (row, width) = (t * t * (t * t), 4.0 * t * t * t / rows as f32);
-        for i in 0..columns {
-            let column = (i as f32 + 0.5) / columns as f32;
-            for side in [-1.0, 1.0] {
-                let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side)
-                else {
-                    continue;
-                };
-                // Half of the square belongs to either side.
-                let weight = f64::from(0.5 * width * cosine / (columns as f32 * per_steradian));
-                let (m, t) = view_between(cosine, ALBEDO_VIEWS);
-                for (m, share) in [(m, 1.0 - f64::from(t)), (m + 1, f64::from(t))] {
-                    (0..3).for_each(|c| sums[m as usize][c] += share * weight * f64::from(f[c]));
+    vectorized(
+        #[inline(always)]
+        || {
+            for j in 0..INTEGRATION_ROWS {
+                // y = t^4, so dy = 4 t^3 dt.
+                let t = (j as f32 + 0.5) / INTEGRATION_ROWS as f32;
+                let (row, width) = (t * t * (t * t), 4.0 * t * t * t / INTEGRATION_ROWS as f32);
+                let sides: [Reflections<INTEGRATION_COLUMNS>; 2] =
+                    SIDES.map(|side| Reflections::new(values, &square, wo, row, &columns, side));
+                for i in 0..INTEGRATION_COLUMNS {
+                    for (f, cosine, per_steradian) in sides.iter().filter_map(|side| side.at(i)) {
+                        // Half of the square belongs to either side.
+                        let area = INTEGRATION_COLUMNS as f32 * per_steradian;
+                        let weight = f64::from(0.5 * width * cosine / area);
+                        let (m, t) = view_between(cosine, ALBEDO_VIEWS);
+                        for (m, share) in [(m, 1.0 - f64::from(t)), (m + 1, f64::from(t))] {
+                            (0..3).for_each(|c| sums[m as usize][c] += share * weight * f64::from(f[c]));
+                        }
+                    }
                 }
             }
-        }
-    }
+        },
+    );
     sums
 }
 
-/// `f`, `cos theta_i` and what turns densities on the square into densities over solid angle, at a point of the square.
-#[inline(always)]
-fn reflected(
-    values: &[[f32; 3]],
-    square: &HalfVectorSquare,
-    wo: [f32; 3],
-    row: f32,
-    column: f32,
-    side: f32,
-) -> Option<([f32; 3], f32, f32)> {
-    let (wi, per_steradian) = square.direction(row, column, side);
-    if !(wi[2] > 0.0) {
-        return None;
+/// What is reflected at `N` points of one row of the square.
+struct Reflections<const N: usize> {
+    f: [[f32; 3]; N],
+    /// `cos theta_i`; not positive where rounding leaves the direction at or below the horizon.
+    cosine: [f32; N],
+    /// What turns densities on the square into densities over solid angle.
+    per_steradian: [f32; N],
+}
+
+impl<const N: usize> Reflections<N> {
+    #[inline(always)]
+    fn new(
+        values: &[[f32; 3]],
+        square: &HalfVectorSquare,
+        wo: [f32; 3],
+        row: f32,
+        columns: &[f32; N],
+        side: f32,
+    ) -> Self {
+        let (mut wi, mut per_steradian) = ([[0.0; N]; 3], [0.0; N]);
+        for k in 0..N {
+            let (direction, density) = square.direction(row, columns[k], side);
+            (wi[0][k], wi[1][k], wi[2][k]) = (direction[0], direction[1], direction[2]);
+            per_steradian[k] = density;
+        }
+        let f = interpolate(values, &Cells::new(&wi, &wo.map(|x| [x; N])));
+        Self { f, cosine: wi[2], per_steradian }
     }
-    let [f] = interpolate(values, &Cells::new(&wi.map(|x| [x]), &wo.map(|x| [x])));
-    Some((f, wi[2], per_steradian))
+
+    /// `f`, the cosine and the factor of densities at a point above the horizon.
+    #[inline(always)]
+    fn at(&self, k: usize) -> Option<([f32; 3], f32, f32)> {
+        (self.cosine[k] > 0.0).then_some((self.f[k], self.cosine[k], self.per_steradian[k]))
+    }
 }
 
 /// The outgoing direction with this cosine, above the x axis.
@@ -184,31 +212,41 @@ fn square_at(values: &[[f32; 3]], scaled: &impl Fn([f32; 3], f32, f32) -> [f32; 
     let square = HalfVectorSquare::new(wo);
     let luminance = |f: [f32; 3]| -> f64 { (0..3).map(|c| LUMINANCE_WEIGHTS[c] * f64::from(f[c])).sum() };
     let (mut sums, mut weights) = (vec![0.0; ROWS * COLUMNS], vec![0.0; ROWS * COLUMNS]);
-    let within = |point: usize| (point as f32 + 0.5) / CELL_POINTS as f32;
-    for point in 0..(ROWS - 1) * CELL_POINTS * (COLUMNS - 1) * CELL_POINTS {
-        let (along, across) = (point / ((COLUMNS - 1) * CELL_POINTS), point % ((COLUMNS - 1) * CELL_POINTS));
-        let (j, x) = (along / CELL_POINTS, within(along % CELL_POINTS));
-        let (i, b) = (across / CELL_POINTS, within(across % CELL_POINTS));
-        let between = |start: f32, end: f32, along: f32| start + (end - start) * along;
-        let row = between(row_node(index(j)), row_node(index(j) + 1), x);
-        let column = between(column_node(index(i)), column_node(index(i) + 1), b);
-        let mut value = 0.0;
-        for side in [-1.0, 1.0] {
-            if let Some((f, cosine, per_steradian)) = reflected(values, &square, wo, row, column, side) {
-                let f = scaled(f, cosine, wo[2]);
-                value += luminance(f) * f64::from(cosine / per_steradian);
+    // The cell of a point, and how far into it the point is.
+    let place =
+        |point: usize| (point / CELL_POINTS, ((point % CELL_POINTS) as f32 + 0.5) / CELL_POINTS as f32);
+    let between = |start: f32, end: f32, along: f32| start + (end - start) * along;
+    let columns = std::array::from_fn(|point| {
+        let (i, b) = place(point);
+        between(column_node(index(i)), column_node(index(i) + 1), b)
+    });
+    vectorized(
+        #[inline(always)]
+        || {
+            for along in 0..(ROWS - 1) * CELL_POINTS {
+                let (j, x) = place(along);
+                let row = between(row_node(index(j)), row_node(index(j) + 1), x);
+                let sides: [Reflections<ROW_POINTS>; 2] =
+                    SIDES.map(|side| Reflections::new(values, &square, wo, row, &columns, side));
+                for across in 0..ROW_POINTS {
+                    let (i, b) = place(across);
+                    let mut value = 0.0;
+                    for (f, cosine, per_steradian) in sides.iter().filter_map(|side| side.at(across)) {
+                        value += luminance(scaled(f, cosine, wo[2])) * f64::from(cosine / per_steradian);
+                    }
+                    for (node, weight) in [
+                        (j * COLUMNS + i, (1.0 - x) * (1.0 - b)),
+                        (j * COLUMNS + i + 1, (1.0 - x) * b),
+                        ((j + 1) * COLUMNS + i, x * (1.0 - b)),
+                        ((j + 1) * COLUMNS + i + 1, x * b),
+                    ] {
+                        sums[node] += f64::from(weight) * value;
+                        weights[node] += f64::from(weight);
+                    }
+                }
             }
-        }
-        for (node, weight) in [
-            (j * COLUMNS + i, (1.0 - x) * (1.0 - b)),
-            (j * COLUMNS + i + 1, (1.0 - x) * b),
-            ((j + 1) * COLUMNS + i, x * (1.0 - b)),
-            ((j + 1) * COLUMNS + i + 1, x * b),
-        ] {
-            sums[node] += f64::from(weight) * value;
-            weights[node] += f64::from(weight);
-        }
-    }
+        },
+    );
     sums.iter().zip(&weights).map(|(sum, weight)| narrow(sum / weight)).collect()
 }
 

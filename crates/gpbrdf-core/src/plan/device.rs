@@ -5,7 +5,6 @@ use std::fmt;
 use nalgebra::Vector3;
 
 use crate::base::error::{Error, Result};
-use crate::base::random::golden_ratio_subset;
 use crate::brdf::angles::{HalfDiff, direction};
 use crate::sample::InPlaneScan;
 
@@ -80,7 +79,8 @@ impl Device {
     ///
     /// Of two that are alike by symmetry (light and detector swapped, or turned about the normal where one of them
     /// stands there) only one is given, with the smaller angle at the light. Where there are more than `most`, they are
-    /// thinned evenly; those nearest to the mirror direction and nearest to the light of each incidence stay.
+    /// thinned evenly in the warped box, so that many of the fine steps near mirror directions stay; those nearest to
+    /// the mirror direction and nearest to the light of each incidence stay all.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for limits out of range, and where nothing is within them.
@@ -135,10 +135,27 @@ impl Device {
         }
         let others: Vec<usize> = (0..reached.len()).filter(|&i| !is_kept[i]).collect();
         let free = most.saturating_sub(reached.len() - others.len());
-        for i in golden_ratio_subset(others.len(), free) {
-            is_kept[others[i]] = true;
+        let shares = others.iter().map(|&i| self.boxes_per_step(&reached[i]));
+        let total: f64 = shares.clone().sum();
+        let mut sum = 0.0;
+        for (&i, share) in others.iter().zip(shares) {
+            let before = (sum / total * free as f64).floor();
+            sum += share;
+            is_kept[i] = (sum / total * free as f64).floor() > before;
         }
         Ok(reached.into_iter().zip(is_kept).filter_map(|(g, kept)| kept.then_some(g)).collect())
+    }
+
+    /// The volume of the warped box that belongs to a geometry, up to a factor: `sin theta_i sin theta_o / (cos theta_d
+    /// sin theta_d sin theta_h sqrt(theta_h))`, from `d omega_i d omega_o = 4 cos theta_d d omega_h d omega_d` (S.
+    /// Rusinkiewicz 1998) and `u = sqrt(theta_h / (pi/2))`. Angles are at least a quarter of a step.
+    fn boxes_per_step(&self, geometry: &Geometry) -> f64 {
+        let least = 0.25 * self.step.to_radians();
+        let HalfDiff { theta_h, theta_d, .. } = geometry.angles();
+        let (theta_h, theta_d) = (theta_h.max(least), theta_d.max(least));
+        let sine = |degrees: f64| degrees.to_radians().max(least).sin();
+        sine(geometry.theta_i) * sine(geometry.theta_o)
+            / (theta_d.cos().max(least) * theta_d.sin() * theta_h.sin() * theta_h.sqrt())
     }
 
     fn validate(&self) -> Result<()> {

@@ -235,3 +235,12 @@ fn cells_of_an_environment_are_those_that_its_light_reaches() {
     let black = crate::base::raster::Raster::filled(4, 2, [0.0f32; 3]);
     assert!(Cells::environment(&Environment::new(black).unwrap(), 10).is_err());
 }
+
+#[test]
+fn fine_steps_are_thinned_to_many_near_mirror_directions() {
+    let found = Device { step: 1.0, ..Device::default() }.geometries(MOST_CANDIDATES).unwrap();
+    assert!((MOST_CANDIDATES * 8 / 10..=MOST_CANDIDATES).contains(&found.len()), "{}", found.len());
+    // Within 3 degrees lies a share of sqrt(3 / 90) of the warped box, and 0.1 % of the hemisphere of half vectors.
+    let near = found.iter().filter(|geometry| geometry.angles().theta_h.to_degrees() < 3.0).count();
+    assert!((found.len() / 10..found.len() / 4).contains(&near), "{near} of {}", found.len());
+}
