@@ -432,6 +432,7 @@ fn random_actions() {
     }
     eprintln!("after all: {:?}", user.done);
     assert_eq!(PANICS.load(Ordering::Relaxed), 0);
+    assert!(actions > 50, "{actions} actions");
     // The second half against the first: what is kept for the next use is there by then.
     let (first, second) = looks.split_at(LOOKS / 2);
     let most = |looks: &[Look], of: fn(&Look) -> usize| looks.iter().map(of).max().unwrap();

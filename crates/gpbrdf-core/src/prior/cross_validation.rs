@@ -80,9 +80,7 @@ pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<C
         .collect();
     let errors = errors.into_iter().collect::<Result<Vec<_>>>()?;
     let all = |layout: usize| errors.iter().flat_map(|own| &own[layout]).copied().collect::<Errors>();
-    let (scattered, in_plane) = (all(0), all(1));
-    let is_empty = scattered.is_empty();
-    Ok(if is_empty { Calibration::NONE } else { Calibration::measured([&scattered, &in_plane]) })
+    Ok(Calibration::measured([&all(0), &all(1)]))
 }
 
 /// Errors in standard deviations, each with its direction.
