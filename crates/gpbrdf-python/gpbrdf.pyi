@@ -197,7 +197,7 @@ def plan(
     count: int | None = None,
     until: float | None = None,
     prior: _Path | None = "built-in",
-    step: float = 5.0,
+    step: float = 1.0,
     incidences: Sequence[float] | None = None,
     theta_max: float = 80.0,
     in_plane: bool = False,

@@ -12,7 +12,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use gpbrdf_app::viewer::{Settings, Viewer};
 use gpbrdf_core::formats::write_samples_csv;
-use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, plan};
+use gpbrdf_core::plan::{Belief, Candidates, Cells, Device, Geometry, Goal, plan};
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Layout, Sample, SampleSet, Source};
 
@@ -228,7 +228,7 @@ fn photograph(scene: &Scene, file: &Path) -> Result {
 fn planned_measurements(name: &str, count: usize) -> Result<SampleSet> {
     let source = Source::built_in(name)?;
     let brdf = source.brdf()?;
-    let candidates = Device::default().geometries(MOST_CANDIDATES)?;
+    let candidates = Candidates::of(&Device::default())?;
     let belief = Belief::before(Some(&Prior::built_in()));
     let cells = Cells::warped_box(Cells::COUNT)?;
     let planned = plan(&belief, &[], &candidates, &cells, Goal::Count(count))?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use gpbrdf_core::brdf::materials;
 use gpbrdf_core::formats::read_environment;
 use gpbrdf_core::gp::OptimizeOptions;
-use gpbrdf_core::plan::{AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, tour};
+use gpbrdf_core::plan::{AxisCosts, Belief, Candidates, Cells, Device, Goal, tour};
 use gpbrdf_core::{FitOptions, HalfDiff, Noise, Shape, brdf};
 use numpy::PyArray2;
 use pyo3::{Bound, Py, PyAny, PyRef, PyResult, Python, pyfunction};
@@ -107,15 +107,16 @@ pub(crate) fn fit(
 /// Chooses the directions to measure next, the most telling first.
 ///
 /// measured: samples that were measured already, or None. count: the number of directions, 20 unless until says the
-/// expected error of ln f to be reached. The instrument: step of all angles, incidences of the light, theta_max of the
-/// detector and min_separation between both, in degrees; in_plane keeps the detector in the plane of incidence.
-/// environment: a .hdr or .exr map in whose light the material will be seen, or None for all directions alike. prior as
-/// in fit(). Ctrl-C stops the fit to what was measured; the choice itself, which takes seconds, is finished first.
+/// expected error of ln f to be reached. The instrument: step of all angles (the first 20 directions are at multiples
+/// of 5 degrees), incidences of the light, theta_max of the detector and min_separation between both, in degrees;
+/// in_plane keeps the detector in the plane of incidence. environment: a .hdr or .exr map in whose light the material
+/// will be seen, or None for all directions alike. prior as in fit(). Ctrl-C stops the fit to what was measured; the
+/// choice itself, which takes seconds, is finished first.
 #[pyfunction]
-#[pyo3(signature = (measured=None, *, count=None, until=None, prior=Some(PathBuf::from("built-in")), step=5.0,
+#[pyo3(signature = (measured=None, *, count=None, until=None, prior=Some(PathBuf::from("built-in")), step=1.0,
     incidences=None, theta_max=80.0, in_plane=false, min_separation=3.0, environment=None))]
 #[pyo3(
-    text_signature = "(measured=None, *, count=None, until=None, prior='built-in', step=5.0, incidences=None, \
+    text_signature = "(measured=None, *, count=None, until=None, prior='built-in', step=1.0, incidences=None, \
 theta_max=80.0, in_plane=False, min_separation=3.0, environment=None)"
 )]
 pub(crate) fn plan(
@@ -142,7 +143,7 @@ pub(crate) fn plan(
     let prior = names::prior(prior)?;
     let measured = measured.as_ref().map(|measured| &measured.inner);
     let (found, way) = observed(py, None, |observer| {
-        let candidates = device.geometries(MOST_CANDIDATES)?;
+        let candidates = Candidates::of(&device)?;
         let cells = match environment {
             None => Cells::warped_box(Cells::COUNT)?,
             Some(path) => Cells::environment(&read_environment(path)?, Cells::COUNT)?,

@@ -11,7 +11,7 @@ use gpbrdf_core::base::number::significant;
 use gpbrdf_core::figure::FigureOptions;
 use gpbrdf_core::formats::read_environment;
 use gpbrdf_core::plan::{
-    AxisCosts, Belief, Cells, Device, Goal, MOST_CANDIDATES, MOST_MEASURED, Plan as Planned, plan, tour,
+    AxisCosts, Belief, Candidates, Cells, Device, Goal, MOST_MEASURED, Plan as Planned, plan, tour,
 };
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::{Content, FitOptions, HalfDiff, fit};
@@ -113,7 +113,8 @@ struct Simulate {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Instrument")]
 pub(crate) struct Instrument {
-    /// Step of all angles, degrees. Plans of a hundred directions and more resolve sharp highlights better with 1.
+    /// Step of all angles, degrees. The first 20 directions are at multiples of 5 degrees, or of the smallest multiple
+    /// of the step above that: few measurements tell most there.
     #[arg(long, value_name = "DEGREES", default_value_t = Device::default().step, allow_hyphen_values = true)]
     step: f64,
     /// Angles between light and normal, degrees. [default: all steps up to --theta-max]
@@ -220,7 +221,7 @@ impl Plan {
             (None, None) => Goal::Count(COUNT),
         };
         let device = self.instrument.device();
-        let candidates = device.geometries(MOST_CANDIDATES)?;
+        let candidates = Candidates::of(&device)?;
         let path = self.output.as_deref().filter(|path| *path != Path::new("-"));
         // Created before the work, so that nobody waits for a plan that cannot be written.
         let file = path.map(|path| anyhow::Ok((path.display(), AtomicFile::create(path)?))).transpose()?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail};
 use gpbrdf_core::brdf::Brdf;
 use gpbrdf_core::figure::{Axis, Curve};
-use gpbrdf_core::plan::{Belief, Cells, Device, Goal, MOST_CANDIDATES, plan};
+use gpbrdf_core::plan::{Belief, Candidates, Cells, Device, Goal, plan};
 use gpbrdf_core::prior::{LearnOptions, Library, family, learn};
 use gpbrdf_core::{BrdfTable, Metrics};
 use serde_json::{Value, json};
@@ -200,7 +200,7 @@ fn rows(context: &Context, trial: &Trial<'_>, principal: &Principal) -> Result<V
     }
     let counts = if context.quick { &QUICK_PEER_COUNTS[..] } else { &PEER_COUNTS[..] };
     let most = counts.iter().copied().max().unwrap_or(0);
-    let candidates = trial.device.geometries(MOST_CANDIDATES)?;
+    let candidates = Candidates::of(trial.device)?;
     let belief = Belief::before(trial.prior.as_ref());
     let chosen = plan(&belief, &[], &candidates, trial.cells, Goal::Count(most))?.geometries;
     for &count in counts {

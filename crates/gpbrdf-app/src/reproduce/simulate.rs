@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use gpbrdf_core::figure::{Axis, Curve, Figure};
 use gpbrdf_core::model::PriorChoice;
-use gpbrdf_core::plan::{Belief, Cells, Device, Geometry, Goal, MOST_CANDIDATES, expected_error, plan};
+use gpbrdf_core::plan::{Belief, Candidates, Cells, Device, Geometry, Goal, expected_error, plan};
 use gpbrdf_core::prior::Prior;
 use gpbrdf_core::sample::InPlaneScan;
 use gpbrdf_core::{
@@ -57,7 +57,7 @@ impl Trial<'_> {
     /// # Errors
     /// Counts that the device does not reach, and those of a fit.
     pub(crate) fn planned(&self, counts: &[usize]) -> Result<Vec<Trained>> {
-        let candidates = self.device.geometries(MOST_CANDIDATES)?;
+        let candidates = Candidates::of(self.device)?;
         let mut belief = Belief::before(self.prior.as_ref());
         let mut chosen: Vec<Geometry> = Vec::new();
         let mut found = Vec::new();

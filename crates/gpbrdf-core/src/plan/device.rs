@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
+use super::candidates::Candidates;
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::{HalfDiff, direction};
 use crate::sample::InPlaneScan;
@@ -13,6 +14,9 @@ const MOST_THETA: f64 = 87.0;
 
 /// The range of steps, degrees.
 const STEPS: std::ops::RangeInclusive<f64> = 0.5..=45.0;
+
+/// The smallest step of the first measurements, degrees.
+const FIRST_STEP: f64 = 5.0;
 
 /// What rounding may add to an angle, degrees.
 const ROUNDING: f64 = 1e-9;
@@ -29,6 +33,14 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Whether another one is the same but for rounding.
+    pub(super) fn is_at(self, other: Self) -> bool {
+        let Self { theta_i, theta_o, phi_o } = other;
+        [self.theta_i - theta_i, self.theta_o - theta_o, self.phi_o - phi_o]
+            .iter()
+            .all(|d| d.abs() < ROUNDING)
+    }
+
     /// The unit directions `[wi, wo]`.
     #[must_use]
     pub fn directions(self) -> [Vector3<f64>; 2] {
@@ -62,10 +74,10 @@ pub struct Device {
 }
 
 impl Default for Device {
-    /// Steps of 5 degrees up to 80 degrees from the normal, with 3 degrees between light and detector.
+    /// Steps of 1 degree up to 80 degrees from the normal, with 3 degrees between light and detector.
     fn default() -> Self {
         Self {
-            step: 5.0,
+            step: 1.0,
             incidences: None,
             theta_max: 80.0,
             in_plane: false,
@@ -146,6 +158,14 @@ impl Device {
         Ok(reached.into_iter().zip(is_kept).filter_map(|(g, kept)| kept.then_some(g)).collect())
     }
 
+    /// The step of the first measurements ([`Candidates::FEW`]), degrees: 5, or the next multiple of the step; `None`
+    /// where the step is not smaller.
+    #[must_use]
+    pub fn first_step(&self) -> Option<f64> {
+        let multiple = (FIRST_STEP / self.step - ROUNDING).ceil();
+        (multiple > 1.0).then_some(multiple * self.step)
+    }
+
     /// The volume of the warped box that belongs to a geometry, up to a factor: `sin theta_i sin theta_o / (cos theta_d
     /// sin theta_d sin theta_h sqrt(theta_h))`, from `d omega_i d omega_o = 4 cos theta_d d omega_h d omega_d` (S.
     /// Rusinkiewicz 1998) and `u = sqrt(theta_h / (pi/2))`. Angles are at least a quarter of a step.
@@ -185,7 +205,13 @@ impl Device {
 impl fmt::Display for Device {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { step, theta_max, min_separation, .. } = self;
-        write!(f, "steps of {step} degrees, light at ")?;
+        let unit = if *step == 1.0 { "degree" } else { "degrees" };
+        write!(f, "steps of {step} {unit}")?;
+        if let Some(first) = self.first_step() {
+            let first = (first * 1e6).round() / 1e6;
+            write!(f, " ({first} for the first {} directions)", Candidates::FEW)?;
+        }
+        f.write_str(", light at ")?;
         match &self.incidences {
             None => write!(f, "0 to {theta_max}")?,
             Some(list) => {

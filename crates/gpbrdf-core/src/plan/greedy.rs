@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::belief::{Belief, Places};
+use super::candidates::Candidates;
 use super::cells::Cells;
 use super::device::Geometry;
 use crate::base::error::{Error, Result};
@@ -11,9 +12,6 @@ use crate::base::random::golden_ratio_subset;
 use crate::base::simd::{add_scaled, dot, dot3, scale_in_place};
 use crate::brdf::angles::HalfDiff;
 use crate::kernel::RowScratch;
-
-/// The usual number of geometries among which a plan chooses.
-pub const MOST_CANDIDATES: usize = 3000;
 
 /// The largest number of measured directions that a plan takes into account; of more, as many are taken, spread evenly.
 pub const MOST_MEASURED: usize = 2000;
@@ -60,7 +58,7 @@ pub struct Plan {
 pub fn plan(
     belief: &Belief,
     measured: &[HalfDiff],
-    candidates: &[Geometry],
+    candidates: &Candidates,
     cells: &Cells,
     goal: Goal,
 ) -> Result<Plan> {
@@ -68,38 +66,69 @@ pub fn plan(
         let found = format!("{} and {}", candidates.len(), cells.len());
         return Err(Error::argument("candidates and cells of a plan", "at least one each", found));
     }
-    match goal {
-        Goal::Count(count) if count > candidates.len() => {
-            let expected = format!("at most {}, the directions to choose from", candidates.len());
-            return Err(Error::argument("number of directions to plan", expected, count));
-        }
-        Goal::Error(error) if !(error > 0.0 && error.is_finite()) => {
-            return Err(Error::argument("error of a plan", "a positive number", error));
-        }
-        _ => {}
-    }
-    let mut state = State::new(belief, measured, candidates, cells)?;
-    let mut chosen = Vec::new();
-    let mut errors = vec![state.error()];
-    let most = match goal {
-        Goal::Count(count) => count,
-        Goal::Error(_) => MOST_CHOSEN.min(candidates.len()),
-    };
-    let is_done = |error: f64| matches!(goal, Goal::Error(goal) if error <= goal);
-    while chosen.len() < most && !is_done(errors[chosen.len()]) {
-        let Some(best) = state.best() else { break };
-        state.choose(best);
-        chosen.push(candidates[best]);
-        errors.push(state.error());
-    }
-    if let Goal::Error(goal) = goal
-        && !is_done(errors[chosen.len()])
+    if let Goal::Error(error) = goal
+        && !(error > 0.0 && error.is_finite())
     {
-        let expected =
-            format!("at least {:.4}, which {} directions reach", errors[chosen.len()], chosen.len());
-        return Err(Error::argument("error of a plan", expected, goal));
+        return Err(Error::argument("error of a plan", "a positive number", error));
     }
-    Ok(Plan { geometries: chosen, errors })
+    let few = Candidates::FEW.saturating_sub(measured.len());
+    let mut found = Plan { geometries: Vec::new(), errors: Vec::new() };
+    if few > 0 && !candidates.first.is_empty() {
+        found.extend(State::new(belief, measured, &candidates.first, cells)?, &candidates.first, goal, few);
+    }
+    let is_new = |geometry: &Geometry| !found.geometries.iter().any(|chosen| chosen.is_at(*geometry));
+    let others: Vec<Geometry> = candidates.all.iter().copied().filter(is_new).collect();
+    let available = found.geometries.len() + others.len();
+    if let Goal::Count(count) = goal
+        && count > available
+    {
+        let expected = format!("at most {available}, the directions to choose from");
+        return Err(Error::argument("number of directions to plan", expected, count));
+    }
+    if !found.reaches(goal) {
+        let known: Vec<HalfDiff> = measured
+            .iter()
+            .copied()
+            .chain(found.geometries.iter().map(|geometry| geometry.angles()))
+            .collect();
+        // The error of the state is that of the last one but for rounding.
+        found.errors.pop();
+        found.extend(State::new(belief, &known, &others, cells)?, &others, goal, usize::MAX);
+    }
+    match goal {
+        Goal::Error(goal) if !found.reaches(Goal::Error(goal)) => {
+            let count = found.geometries.len();
+            let expected = format!("at least {:.4}, which {count} directions reach", found.errors[count]);
+            Err(Error::argument("error of a plan", expected, goal))
+        }
+        _ => Ok(found),
+    }
+}
+
+impl Plan {
+    /// Whether it ends here; a plan without the error of its beginning does not.
+    fn reaches(&self, goal: Goal) -> bool {
+        let Some(error) = self.errors.last() else { return false };
+        match goal {
+            Goal::Count(count) => self.geometries.len() >= count,
+            Goal::Error(goal) => *error <= goal,
+        }
+    }
+
+    /// Chooses the next directions, at most until there are `most` of them, beginning with the error before them.
+    fn extend(&mut self, mut state: State<'_>, candidates: &[Geometry], goal: Goal, most: usize) {
+        let most = match goal {
+            Goal::Count(count) => count.min(most),
+            Goal::Error(_) => MOST_CHOSEN.min(most),
+        };
+        self.errors.push(state.error());
+        while self.geometries.len() < most && !self.reaches(goal) {
+            let Some(best) = state.best() else { break };
+            state.choose(best);
+            self.geometries.push(candidates[best]);
+            self.errors.push(state.error());
+        }
+    }
 }
 
 /// The expected error after measurements, as in [`Plan::errors`].

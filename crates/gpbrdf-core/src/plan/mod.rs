@@ -4,15 +4,17 @@
 //! remain after any measurements are therefore known before they are made, as far as the hyper-parameters are.
 
 mod belief;
+mod candidates;
 mod cells;
 mod device;
 mod greedy;
 mod tour;
 
 pub use belief::Belief;
+pub use candidates::Candidates;
 pub use cells::Cells;
 pub use device::{Device, Geometry};
-pub use greedy::{Goal, MOST_CANDIDATES, MOST_MEASURED, Plan, expected_error, plan};
+pub use greedy::{Goal, MOST_MEASURED, Plan, expected_error, plan};
 pub use tour::{AxisCosts, tour};
 
 #[cfg(test)]

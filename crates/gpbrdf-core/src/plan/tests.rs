@@ -18,6 +18,9 @@ fn prior() -> Arc<Prior> {
     Arc::new(learn("test", &library, &LearnOptions { functions: [8, 4] }).unwrap())
 }
 
+/// More geometries than the devices of these tests have, unless their steps are fine.
+const MOST: usize = 3000;
+
 fn coarse() -> Device {
     Device { step: 15.0, theta_max: 75.0, ..Device::default() }
 }
@@ -26,7 +29,7 @@ fn coarse() -> Device {
 #[test]
 fn expected_errors_are_those_of_the_conditioned_process() {
     let prior = prior();
-    let candidates = coarse().geometries(MOST_CANDIDATES).unwrap();
+    let candidates = Candidates::of(&coarse()).unwrap();
     let cells = Cells::hemisphere(300).unwrap();
     for prior in [Some(&prior), None] {
         let belief = Belief::before(prior);
@@ -76,11 +79,11 @@ fn expected_errors_are_those_of_the_conditioned_process() {
 /// The first choice is the best of all single measurements, and choices go on from measurements as from choices.
 #[test]
 fn choices_are_the_best_ones_and_may_be_made_in_stages() {
-    let candidates = Device { step: 30.0, theta_max: 60.0, ..Device::default() }.geometries(1000).unwrap();
+    let candidates = Candidates::of(&Device { step: 30.0, theta_max: 60.0, ..Device::default() }).unwrap();
     let cells = Cells::hemisphere(200).unwrap();
     let belief = Belief::before(Some(&prior()));
     let whole = plan(&belief, &[], &candidates, &cells, Goal::Count(8)).unwrap();
-    let single = candidates.iter().map(|g| expected_error(&belief, &[g.angles()], &cells).unwrap());
+    let single = candidates.all.iter().map(|g| expected_error(&belief, &[g.angles()], &cells).unwrap());
     let best = single.fold(f64::INFINITY, f64::min);
     assert!((whole.errors[1] / best - 1.0).abs() < 1e-9, "{} {best}", whole.errors[1]);
     let known: Vec<HalfDiff> = whole.geometries[..3].iter().map(|g| g.angles()).collect();
@@ -94,9 +97,59 @@ fn choices_are_the_best_ones_and_may_be_made_in_stages() {
     assert_eq!(run(1), run(3));
 }
 
+/// The first measurements are at coarse steps, those after them at all, in one plan or in several.
+#[test]
+fn the_first_measurements_are_planned_at_coarse_steps() {
+    let cells = Cells::warped_box(200).unwrap();
+    let belief = Belief::before(Some(&prior()));
+    let few = Candidates::FEW;
+    let is_coarse = |step: f64| {
+        move |g: &Geometry| {
+            [g.theta_i, g.theta_o, 180.0 - g.phi_o].iter().all(|angle| (angle / step).fract() == 0.0)
+        }
+    };
+    for (step, coarse) in [(1.0, 5.0), (2.0, 6.0)] {
+        let device = Device { step, theta_max: 60.0, ..Device::default() };
+        let candidates = Candidates::of(&device).unwrap();
+        let run = |known: &[Geometry], goal| {
+            let known: Vec<HalfDiff> = known.iter().map(|geometry| geometry.angles()).collect();
+            plan(&belief, &known, &candidates, &cells, goal).unwrap()
+        };
+        let whole = run(&[], Goal::Count(few + 10));
+        assert_eq!((whole.geometries.len(), whole.errors.len()), (few + 10, few + 11));
+        assert!(whole.errors.windows(2).all(|pair| pair[1] < pair[0]), "{:?}", whole.errors);
+        assert!(whole.geometries[..few].iter().all(is_coarse(coarse)));
+        assert!(whole.geometries[few..].iter().any(|geometry| !is_coarse(coarse)(geometry)));
+        for (i, geometry) in whole.geometries.iter().enumerate() {
+            assert!(!whole.geometries[..i].contains(geometry), "{geometry:?}");
+        }
+        for known in [7, few, few + 4] {
+            let (known, next) = whole.geometries.split_at(known);
+            assert_eq!(run(known, Goal::Count(next.len())).geometries, next);
+        }
+        let until = run(&[], Goal::Error(whole.errors[few + 3]));
+        assert_eq!(until.geometries, whole.geometries[..few + 3]);
+    }
+    // Nothing but the normal is at multiples of 5 degrees, too near to the light; 4 degrees of both are far enough.
+    let device = Device { theta_max: 4.0, ..Device::default() };
+    let candidates = Candidates::of(&device).unwrap();
+    assert!(candidates.first.is_empty());
+    assert_eq!(plan(&belief, &[], &candidates, &cells, Goal::Count(3)).unwrap().geometries.len(), 3);
+    // Fewer at coarse steps than the first measurements: the others are at fine ones.
+    let device = Device { theta_max: 10.0, in_plane: true, ..Device::default() };
+    let candidates = Candidates::of(&device).unwrap();
+    let coarse = candidates.first.len();
+    assert!((1..few).contains(&coarse));
+    let whole = plan(&belief, &[], &candidates, &cells, Goal::Count(few)).unwrap().geometries;
+    assert!(whole[..coarse].iter().all(is_coarse(5.0)) && !is_coarse(5.0)(&whole[coarse]));
+    assert!(plan(&belief, &[], &candidates, &cells, Goal::Count(candidates.len())).is_ok());
+    let message = plan(&belief, &[], &candidates, &cells, Goal::Count(1_000_000)).unwrap_err().to_string();
+    assert!(message.contains("expected at most ") && message.ends_with("found 1000000"), "{message}");
+}
+
 #[test]
 fn plans_end_with_their_goal_or_say_how_far_they_get() {
-    let candidates = coarse().geometries(MOST_CANDIDATES).unwrap();
+    let candidates = Candidates::from(coarse().geometries(MOST).unwrap());
     let cells = Cells::hemisphere(200).unwrap();
     let belief = Belief::before(None);
     let run = |goal| plan(&belief, &[], &candidates, &cells, goal);
@@ -113,28 +166,28 @@ fn plans_end_with_their_goal_or_say_how_far_they_get() {
     let expected = format!("expected at most {all}, the directions to choose from, found {}", all + 1);
     assert!(message.ends_with(&expected), "{message}");
     assert!(run(Goal::Error(0.0)).is_err() && run(Goal::Error(f64::NAN)).is_err());
-    assert!(plan(&belief, &[], &[], &cells, Goal::Count(0)).is_err());
+    assert!(plan(&belief, &[], &Candidates::default(), &cells, Goal::Count(0)).is_err());
     // All of them, each once.
     let mut every = run(Goal::Count(all)).unwrap().geometries;
     let order = |g: &Geometry, h: &Geometry| {
         [g.theta_i, g.theta_o, g.phi_o].partial_cmp(&[h.theta_i, h.theta_o, h.phi_o]).unwrap()
     };
     every.sort_by(order);
-    assert_eq!(every, candidates);
+    assert_eq!(every, candidates.all);
 }
 
 #[test]
 fn geometries_keep_to_the_limits_and_none_is_there_twice() {
     let devices = [
-        Device::default(),
+        Device { step: 5.0, ..Device::default() },
         Device { step: 2.0, ..Device::default() },
         Device { step: 7.0, ..Device::default() },
-        Device { in_plane: true, min_separation: 12.0, ..Device::default() },
-        Device { incidences: Some(vec![70.0, 12.5, 40.0]), theta_max: 60.0, ..Device::default() },
+        Device { step: 5.0, in_plane: true, min_separation: 12.0, ..Device::default() },
+        Device { step: 5.0, incidences: Some(vec![70.0, 12.5, 40.0]), theta_max: 60.0, ..Device::default() },
     ];
     for device in devices {
-        let found = device.geometries(MOST_CANDIDATES).unwrap();
-        assert!(found.len() <= MOST_CANDIDATES);
+        let found = device.geometries(MOST).unwrap();
+        assert!(found.len() <= MOST);
         for Geometry { theta_i, theta_o, phi_o } in &found {
             let is_multiple = |x: f64| (x / device.step - (x / device.step).round()).abs() < 1e-9;
             assert!(is_multiple(*theta_o) && is_multiple(180.0 - *phi_o) && *theta_o <= device.theta_max);
@@ -182,13 +235,17 @@ fn limits_out_of_range_are_refused() {
     for incidences in [vec![], vec![f64::NAN], vec![10.0, 88.0]] {
         assert!(refused(Device { incidences: Some(incidences), ..device.clone() }).contains("incidences"));
     }
+    assert_eq!(device.first_step(), Some(5.0));
+    assert_eq!(Device { step: 2.0, ..device.clone() }.first_step(), Some(6.0));
+    assert_eq!(Device { step: 5.0 / 3.0, ..device.clone() }.first_step(), Some(5.0));
+    assert_eq!(Device { step: 5.0, ..device.clone() }.first_step(), None);
     let nothing = Device { theta_max: 40.0, min_separation: 120.0, ..device };
     assert!(refused(nothing).starts_with("limits of the instrument: expected at least one pair"));
 }
 
 #[test]
 fn tours_visit_all_and_are_no_longer_than_the_order_of_rank() {
-    let candidates = Device::default().geometries(MOST_CANDIDATES).unwrap();
+    let candidates = Device { step: 5.0, ..Device::default() }.geometries(MOST).unwrap();
     let order: Vec<usize> = crate::base::random::golden_ratio_subset(candidates.len(), 60);
     let geometries: Vec<Geometry> = order.iter().map(|&i| candidates[i]).collect();
     for costs in [AxisCosts::default(), AxisCosts { theta_i: 20.0, phi_o: 0.1, ..AxisCosts::default() }] {
@@ -238,8 +295,8 @@ fn cells_of_an_environment_are_those_that_its_light_reaches() {
 
 #[test]
 fn fine_steps_are_thinned_to_many_near_mirror_directions() {
-    let found = Device { step: 1.0, ..Device::default() }.geometries(MOST_CANDIDATES).unwrap();
-    assert!((MOST_CANDIDATES * 8 / 10..=MOST_CANDIDATES).contains(&found.len()), "{}", found.len());
+    let found = Device::default().geometries(MOST).unwrap();
+    assert!((MOST * 8 / 10..=MOST).contains(&found.len()), "{}", found.len());
     // Within 3 degrees lies a share of sqrt(3 / 90) of the warped box, and 0.1 % of the hemisphere of half vectors.
     let near = found.iter().filter(|geometry| geometry.angles().theta_h.to_degrees() < 3.0).count();
     assert!((found.len() / 10..found.len() / 4).contains(&near), "{near} of {}", found.len());

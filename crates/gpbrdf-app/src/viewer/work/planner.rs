@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gpbrdf_core::plan::{Belief, Cells, Device, Goal, MOST_CANDIDATES, Plan, plan};
+use gpbrdf_core::plan::{Belief, Candidates, Cells, Device, Goal, Plan, plan};
 use gpbrdf_core::{FitOptions, Model, SampleSet};
 
 use super::mailbox::{Mailbox, Sender};
@@ -67,7 +67,7 @@ pub(crate) fn spawn(outbox: Outbox<Planned>) -> std::io::Result<Sender<PlanReque
 
 fn planned(request: &PlanRequest) -> anyhow::Result<Plan> {
     let PlanKey { device, count, prior, .. } = &request.key;
-    let candidates = device.geometries(MOST_CANDIDATES)?;
+    let candidates = Candidates::of(device)?;
     let cells = Cells::warped_box(Cells::COUNT)?;
     let options = FitOptions { prior: prior.open()?, ..FitOptions::default() };
     let (belief, measured) = match &request.known {
