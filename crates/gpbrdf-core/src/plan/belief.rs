@@ -1,5 +1,6 @@
 //! The process whose variances a plan reduces.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use crate::base::error::{Error, Result};
@@ -15,6 +16,11 @@ const NOISE: f64 = 1e-4;
 
 /// The variance of `ln f` where nothing is known of other materials.
 const BROAD: f64 = 4.0;
+
+/// How much brighter the mirror direction is than 5 degrees beside it where a highlight is called sharp. Of 17 measured
+/// materials (J. Dupuy and W. Jakob 2018) nine have at least 1.7 at some `theta_d` of up to 45 degrees, the matte ones
+/// at most 1.3.
+const SHARP: f64 = 1.5;
 
 /// A process of the brightness of a material: the covariance `v B(x)^T B(x') + k(x, x')` with the achromatic principal
 /// functions `B` of a learned prior, or `k(x, x')` alone.
@@ -32,6 +38,8 @@ pub struct Belief {
     pub(super) noise_variance: f64,
     /// The variance of `ln f`, mean of the channels, per variance of the process.
     pub(super) scale: f64,
+    /// Whether some highlight may be too sharp for coarse steps of an instrument.
+    pub(super) may_be_sharp: bool,
 }
 
 impl Belief {
@@ -50,6 +58,7 @@ impl Belief {
             space,
             noise_variance: NOISE,
             scale: scale(prior.is_some()),
+            may_be_sharp: true,
         }
     }
 
@@ -80,10 +89,12 @@ impl Belief {
             kernel: hyper.kernel.clone(),
             space,
             noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
+            may_be_sharp: true,
         })
     }
 
-    /// What is known with a model that was fitted to samples with these options.
+    /// What is known with a model that was fitted to samples with these options. Beside its variances this is whether
+    /// the model has a sharp highlight, without which measurements near mirror directions tell little.
     ///
     /// # Errors
     /// A model without hyper-parameters, and those of [`Belief::of_fit`].
@@ -91,7 +102,8 @@ impl Belief {
         let Some(hyper) = model.hyper() else {
             return Err(Error::argument("model of a plan", "one with hyper-parameters", "none"));
         };
-        Self::of_fit(&hyper, options.prior(samples).as_ref())
+        let may_be_sharp = has_sharp_highlight(model);
+        Ok(Self { may_be_sharp, ..Self::of_fit(&hyper, options.prior(samples).as_ref())? })
     }
 
     /// The factors by which variances at directions are larger than the process says: those of the intervals of a fit.
@@ -111,6 +123,19 @@ impl Belief {
             features: features.unwrap_or_default(),
         }
     }
+}
+
+/// Whether the mirror direction is much brighter than 5 degrees beside it, at some `theta_d`.
+fn has_sharp_highlight(model: &Model) -> bool {
+    let at = |theta_h: f64, theta_d: f64| HalfDiff {
+        theta_h: theta_h.to_radians(),
+        theta_d: theta_d.to_radians(),
+        phi_d: FRAC_PI_2,
+    };
+    let pairs = [5.0, 15.0, 25.0, 35.0, 45.0].map(|theta_d| [at(0.0, theta_d), at(5.0, theta_d)]);
+    let brightness: Vec<f64> =
+        model.predict_mean(pairs.as_flattened()).iter().map(|value| value.iter().sum()).collect();
+    brightness.chunks(2).any(|pair| pair[0] > SHARP * pair[1])
 }
 
 /// The variance of the mean of the logarithms of three channels, per variance of their achromatic colour; processes

@@ -15,8 +15,8 @@ const MOST_THETA: f64 = 87.0;
 /// The range of steps, degrees.
 const STEPS: std::ops::RangeInclusive<f64> = 0.5..=45.0;
 
-/// The smallest step of the first measurements, degrees.
-const FIRST_STEP: f64 = 5.0;
+/// The smallest of coarse steps, degrees.
+const COARSE_STEP: f64 = 5.0;
 
 /// What rounding may add to an angle, degrees.
 const ROUNDING: f64 = 1e-9;
@@ -158,11 +158,11 @@ impl Device {
         Ok(reached.into_iter().zip(is_kept).filter_map(|(g, kept)| kept.then_some(g)).collect())
     }
 
-    /// The step of the first measurements ([`Candidates::FEW`]), degrees: 5, or the next multiple of the step; `None`
-    /// where the step is not smaller.
+    /// The step of the first measurements ([`Candidates::FEW`]) and of those of matte materials, degrees: 5, or the next
+    /// multiple of the step; `None` where the step is not smaller.
     #[must_use]
-    pub fn first_step(&self) -> Option<f64> {
-        let multiple = (FIRST_STEP / self.step - ROUNDING).ceil();
+    pub fn coarse_step(&self) -> Option<f64> {
+        let multiple = (COARSE_STEP / self.step - ROUNDING).ceil();
         (multiple > 1.0).then_some(multiple * self.step)
     }
 
@@ -207,9 +207,9 @@ impl fmt::Display for Device {
         let Self { step, theta_max, min_separation, .. } = self;
         let unit = if *step == 1.0 { "degree" } else { "degrees" };
         write!(f, "steps of {step} {unit}")?;
-        if let Some(first) = self.first_step() {
-            let first = (first * 1e6).round() / 1e6;
-            write!(f, " ({first} for the first {} directions)", Candidates::FEW)?;
+        if let Some(coarse) = self.coarse_step() {
+            let coarse = (coarse * 1e6).round() / 1e6;
+            write!(f, " ({coarse} for the first {} and for matte materials)", Candidates::FEW)?;
         }
         f.write_str(", light at ")?;
         match &self.incidences {

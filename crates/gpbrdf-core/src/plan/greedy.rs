@@ -71,10 +71,10 @@ pub fn plan(
     {
         return Err(Error::argument("error of a plan", "a positive number", error));
     }
-    let few = Candidates::FEW.saturating_sub(measured.len());
+    let few = if belief.may_be_sharp { Candidates::FEW.saturating_sub(measured.len()) } else { usize::MAX };
     let mut found = Plan { geometries: Vec::new(), errors: Vec::new() };
-    if few > 0 && !candidates.first.is_empty() {
-        found.extend(State::new(belief, measured, &candidates.first, cells)?, &candidates.first, goal, few);
+    if few > 0 && !candidates.coarse.is_empty() {
+        found.extend(State::new(belief, measured, &candidates.coarse, cells)?, &candidates.coarse, goal, few);
     }
     let is_new = |geometry: &Geometry| !found.geometries.iter().any(|chosen| chosen.is_at(*geometry));
     let others: Vec<Geometry> = candidates.all.iter().copied().filter(is_new).collect();

@@ -4,7 +4,7 @@ use super::*;
 use crate::brdf::{angles::HalfDiff, materials};
 use crate::gp::Solver;
 use crate::judge::Environment;
-use crate::model::{FitOptions, IntervalOf, PriorChoice, condition};
+use crate::model::{FitOptions, IntervalOf, PriorChoice, condition, fit};
 use crate::prior::{LearnOptions, Library, Prior, learn};
 use crate::sample::{Sample, SampleSet};
 use crate::{Brdf, Hyper};
@@ -133,18 +133,43 @@ fn the_first_measurements_are_planned_at_coarse_steps() {
     // Nothing but the normal is at multiples of 5 degrees, too near to the light; 4 degrees of both are far enough.
     let device = Device { theta_max: 4.0, ..Device::default() };
     let candidates = Candidates::of(&device).unwrap();
-    assert!(candidates.first.is_empty());
+    assert!(candidates.coarse.is_empty());
     assert_eq!(plan(&belief, &[], &candidates, &cells, Goal::Count(3)).unwrap().geometries.len(), 3);
     // Fewer at coarse steps than the first measurements: the others are at fine ones.
     let device = Device { theta_max: 10.0, in_plane: true, ..Device::default() };
     let candidates = Candidates::of(&device).unwrap();
-    let coarse = candidates.first.len();
+    let coarse = candidates.coarse.len();
     assert!((1..few).contains(&coarse));
     let whole = plan(&belief, &[], &candidates, &cells, Goal::Count(few)).unwrap().geometries;
     assert!(whole[..coarse].iter().all(is_coarse(5.0)) && !is_coarse(5.0)(&whole[coarse]));
     assert!(plan(&belief, &[], &candidates, &cells, Goal::Count(candidates.len())).is_ok());
     let message = plan(&belief, &[], &candidates, &cells, Goal::Count(1_000_000)).unwrap_err().to_string();
     assert!(message.contains("expected at most ") && message.ends_with("found 1000000"), "{message}");
+}
+
+#[test]
+fn fine_steps_are_left_to_materials_with_sharp_highlights() {
+    let cells = Cells::warped_box(200).unwrap();
+    let candidates = Candidates::of(&Device::default()).unwrap();
+    let prior = prior();
+    let first =
+        plan(&Belief::before(Some(&prior)), &[], &candidates, &cells, Goal::Count(Candidates::FEW)).unwrap();
+    let next = |brdf: &dyn Brdf| {
+        let sample = |geometry: &Geometry| {
+            let [wi, wo] = geometry.directions();
+            Sample { wi, wo, value: brdf.eval(&wi, &wo) }
+        };
+        let samples: SampleSet = first.geometries.iter().map(sample).collect();
+        let options = FitOptions { prior: PriorChoice::Learned(Arc::clone(&prior)), ..FitOptions::default() };
+        let model = fit(&samples, &options).unwrap().model;
+        let belief = Belief::of_model(&model, &samples, &options).unwrap();
+        plan(&belief, &samples.angles, &candidates, &cells, Goal::Count(10)).unwrap().geometries
+    };
+    let is_coarse =
+        |g: &Geometry| [g.theta_i, g.theta_o, g.phi_o].iter().all(|angle| (angle / 5.0).fract() == 0.0);
+    let named = |name: &str| materials().iter().find(|material| material.name == name).unwrap();
+    assert!(next(&named("lambert").brdf).iter().all(is_coarse));
+    assert!(!next(&named("red-plastic").brdf).iter().all(is_coarse));
 }
 
 #[test]
@@ -235,10 +260,10 @@ fn limits_out_of_range_are_refused() {
     for incidences in [vec![], vec![f64::NAN], vec![10.0, 88.0]] {
         assert!(refused(Device { incidences: Some(incidences), ..device.clone() }).contains("incidences"));
     }
-    assert_eq!(device.first_step(), Some(5.0));
-    assert_eq!(Device { step: 2.0, ..device.clone() }.first_step(), Some(6.0));
-    assert_eq!(Device { step: 5.0 / 3.0, ..device.clone() }.first_step(), Some(5.0));
-    assert_eq!(Device { step: 5.0, ..device.clone() }.first_step(), None);
+    assert_eq!(device.coarse_step(), Some(5.0));
+    assert_eq!(Device { step: 2.0, ..device.clone() }.coarse_step(), Some(6.0));
+    assert_eq!(Device { step: 5.0 / 3.0, ..device.clone() }.coarse_step(), Some(5.0));
+    assert_eq!(Device { step: 5.0, ..device.clone() }.coarse_step(), None);
     let nothing = Device { theta_max: 40.0, min_separation: 120.0, ..device };
     assert!(refused(nothing).starts_with("limits of the instrument: expected at least one pair"));
 }

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::primaries::{self, ToSrgb};
 use super::{Decoded, Refused, check_size, cube};
 use crate::base::raster::Raster;
+use crate::formats::exr::blocks::largest_block;
 
 /// Names of layers that hold the whole picture, in small letters.
 const WHOLE: [&str; 5] = ["combined", "rgba", "rgb", "beauty", "color"];
@@ -205,6 +206,10 @@ fn check_plausible(
             format!("{} x {}", window[0], window[1]),
         ));
     }
+    let (block, most) = (largest_block(headers), SMALL.max(need));
+    if block > most {
+        return Err(Refused::new(format!("blocks of at most {most} bytes"), format!("one of {block}")));
+    }
     Ok(())
 }
 
@@ -273,6 +278,7 @@ fn to_srgb(header: &Header, colours: Colours) -> Result<Option<ToSrgb>, Refused>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::exr::blocks::with_tile_width;
     use ::exr::meta::attribute::Chromaticities;
     use ::exr::prelude::{
         AnyChannel, AnyChannels, Encoding, FlatSamples, Image, IntegerBounds, Layer as ExrLayer,
@@ -375,6 +381,19 @@ mod tests {
         assert_eq!(larger, Raster::from_fn(8, 4, |x, y| [expected(x, y); 3]));
         let smaller = moved((-1, 0), IntegerBounds::new((0, 1), (2, 1)));
         assert_eq!(smaller.pixels(), [[5.0; 3], [6.0; 3]]);
+    }
+
+    #[test]
+    fn tiles_that_are_larger_than_pictures_are_refused_before_memory_is_taken() {
+        let tiled = |image: &mut Image<ExrLayer<AnyChannels<FlatSamples>>>| {
+            image.layer_data.encoding = Encoding::FAST_LOSSLESS;
+        };
+        let whole = file(&[("R", RAMP), ("G", RAMP), ("B", RAMP)], tiled);
+        assert_eq!(*pixels(&whole).at(1, 1), [5.0; 3]);
+        assert_eq!(pixels(&with_tile_width(&whole, 16384)), pixels(&whole));
+        let message = refused(&with_tile_width(&whole, 1 << 25));
+        assert_eq!(message, "expected blocks of at most 50331648 bytes, found one of 25769803776");
+        assert!(decode(&with_tile_width(&whole, i32::MAX.cast_unsigned())).is_err());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `OpenEXR`: baked tables, and pictures.
 
+pub(crate) mod blocks;
 pub(crate) mod image;
 pub(crate) mod table;
 

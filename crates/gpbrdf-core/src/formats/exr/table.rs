@@ -29,6 +29,7 @@ use exr::prelude::f16;
 use crate::base::atomic_file::AtomicFile;
 use crate::base::error::{Error, Result};
 use crate::brdf::table::{BrdfTable, N_CELLS, N_PHI_D, N_THETA_D, N_THETA_H};
+use crate::formats::exr::blocks::largest_block;
 use crate::formats::read::{NotFinite, open};
 
 /// A baked table as `OpenEXR`.
@@ -44,6 +45,9 @@ const HEIGHT: usize = N_THETA_D * N_THETA_H;
 
 /// Limit on the number of blocks, far above that of any sensible file of this kind.
 const MAX_BLOCKS: usize = 1 << 20;
+
+/// The largest block in bytes: twice a whole table of three channels in `f32`.
+const MAX_BLOCK_BYTES: usize = 48 << 20;
 
 /// The values of one part in MERL order, one per cell of a table.
 #[derive(Clone, Copy, Debug)]
@@ -219,6 +223,10 @@ fn read(from: impl Read + Seek, path: &Path) -> Result<BrdfTable> {
             format!("a part of {} blocks", header.chunk_count),
         ));
     }
+    let block = largest_block(headers);
+    if block > MAX_BLOCK_BYTES {
+        return Err(wrong("blocks of at most 48 MiB", format!("one of {block} bytes")));
+    }
     let named = |header: &&(usize, [usize; 3])| {
         headers[header.0].own_attributes.layer_name.as_ref().is_some_and(|name| name.eq("mean"))
     };
@@ -319,6 +327,7 @@ mod tests {
 
     use super::*;
     use crate::brdf::table::cell_index;
+    use crate::formats::exr::blocks::with_tile_width;
     use crate::formats::mutate::mutations;
 
     fn table() -> BrdfTable {
@@ -409,6 +418,8 @@ mod tests {
         };
         let found = decode(&write((WIDTH, HEIGHT))).unwrap();
         assert_eq!(found.cell(3, 7, 11), [11.0, ((7 + 90 * 3) / 4) as f32, 0.5]);
+        let large = message(&with_tile_width(&write((WIDTH, HEIGHT)), 1 << 25));
+        assert!(large.contains("expected blocks of at most 48 MiB, found one of "), "{large}");
         let wrong = message(&write((64, 32)));
         assert!(wrong.ends_with("expected an image of 180 x 8100 pixels, found 64 x 32"), "{wrong}");
     }

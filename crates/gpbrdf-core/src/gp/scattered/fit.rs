@@ -34,7 +34,7 @@ const TERMS: usize = 1000;
 /// The largest number of iterations after neighbours or weights have changed.
 const LATER_ITERATIONS: u64 = 20;
 
-/// The fewest samples whose search has several points to start from.
+/// The fewest samples without learned functions whose search has several points to start from.
 const SEVERAL_STARTS: usize = 1000;
 
 /// How often weights of outliers are renewed at most.
@@ -159,8 +159,8 @@ impl<'a> Search<'a> {
             weights: vec![1.0; data.len()],
         };
         let mut likelihood = Likelihood::new(problem, &data, &start, &state)?;
-        // What a basis leaves is small and smooth, and of few samples the priors decide.
-        let several = problem.priors && problem.basis.is_none() && data.len() >= SEVERAL_STARTS;
+        // Of few samples the priors decide, unless there are functions that can say the same as the kernel.
+        let several = problem.priors && (problem.basis.is_some() || data.len() >= SEVERAL_STARTS);
         let points = if several { start.alternatives() } else { Vec::new() };
         let from = likelihood.likeliest(&points)?;
         let found = likelihood.maximise(from, problem.optimize)?;
