@@ -113,8 +113,8 @@ struct Simulate {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Instrument")]
 pub(crate) struct Instrument {
-    /// Step of all angles, degrees. The first 20 directions are at multiples of 5 degrees, or of the smallest multiple
-    /// of the step above that: few measurements tell most there.
+    /// Step of all angles, degrees. The first 20 directions, and all of matte materials, are at multiples of 5 degrees
+    /// or of the next multiple of the step: few measurements tell most there.
     #[arg(long, value_name = "DEGREES", default_value_t = Device::default().step, allow_hyphen_values = true)]
     step: f64,
     /// Angles between light and normal, degrees. [default: all steps up to --theta-max]

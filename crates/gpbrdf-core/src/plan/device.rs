@@ -158,8 +158,8 @@ impl Device {
         Ok(reached.into_iter().zip(is_kept).filter_map(|(g, kept)| kept.then_some(g)).collect())
     }
 
-    /// The step of the first measurements ([`Candidates::FEW`]) and of those of matte materials, degrees: 5, or the next
-    /// multiple of the step; `None` where the step is not smaller.
+    /// The step of the first measurements ([`Candidates::FEW`]) and of those of matte materials, degrees: 5, or the
+    /// next multiple of the step; `None` where the step is not smaller.
     #[must_use]
     pub fn coarse_step(&self) -> Option<f64> {
         let multiple = (COARSE_STEP / self.step - ROUNDING).ceil();
