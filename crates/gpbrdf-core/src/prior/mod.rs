@@ -93,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "5602ba41808fb87f1243c29c242e942fd95c035c4ca2235a65bbdf2a68996b77";
+    pub const BUILT_IN_SHA256: &str = "16c20b2320d35860a69dd330fc4d09462fe8cc2c761a2ff3852f8eff6ab8b51a";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]
