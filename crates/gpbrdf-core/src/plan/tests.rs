@@ -169,7 +169,7 @@ fn fine_steps_are_left_to_materials_with_sharp_highlights() {
         |g: &Geometry| [g.theta_i, g.theta_o, g.phi_o].iter().all(|angle| (angle / 5.0).fract() == 0.0);
     let named = |name: &str| materials().iter().find(|material| material.name == name).unwrap();
     assert!(next(&named("lambert").brdf).iter().all(is_coarse));
-    assert!(!next(&named("red-plastic").brdf).iter().all(is_coarse));
+    assert!(!next(&named("purple-paint").brdf).iter().all(is_coarse));
 }
 
 #[test]
