@@ -21,6 +21,20 @@ fn prior() -> Arc<Prior> {
 /// More geometries than the devices of these tests have, unless their steps are fine.
 const MOST: usize = 3000;
 
+/// The values of a material.
+fn measured(brdf: &dyn Brdf, geometries: &[Geometry]) -> SampleSet {
+    let sample = |geometry: &Geometry| {
+        let [wi, wo] = geometry.directions();
+        Sample { wi, wo, value: brdf.eval(&wi, &wo) }
+    };
+    geometries.iter().map(sample).collect()
+}
+
+/// Whether all angles are multiples of a step, azimuths from the mirror direction.
+fn is_coarse(step: f64) -> impl Fn(&Geometry) -> bool {
+    move |g| [g.theta_i, g.theta_o, 180.0 - g.phi_o].iter().all(|angle| (angle / step).fract() == 0.0)
+}
+
 fn coarse() -> Device {
     Device { step: 15.0, theta_max: 75.0, ..Device::default() }
 }
@@ -35,12 +49,8 @@ fn expected_errors_are_those_of_the_conditioned_process() {
         let belief = Belief::before(prior);
         let found = plan(&belief, &[], &candidates, &cells, Goal::Count(9)).unwrap();
         let material = &materials()[3].brdf;
-        let sample = |geometry: &Geometry| {
-            let [wi, wo] = geometry.directions();
-            Sample { wi, wo, value: material.eval(&wi, &wo) }
-        };
         for count in [1, 4, 9] {
-            let samples: SampleSet = found.geometries[..count].iter().map(sample).collect();
+            let samples = measured(material, &found.geometries[..count]);
             let own = Hyper::new(
                 Solver::Scattered,
                 belief.kernel.clone(),
@@ -103,11 +113,6 @@ fn the_first_measurements_are_planned_at_coarse_steps() {
     let cells = Cells::warped_box(200).unwrap();
     let belief = Belief::before(Some(&prior()));
     let few = Candidates::FEW;
-    let is_coarse = |step: f64| {
-        move |g: &Geometry| {
-            [g.theta_i, g.theta_o, 180.0 - g.phi_o].iter().all(|angle| (angle / step).fract() == 0.0)
-        }
-    };
     for (step, coarse) in [(1.0, 5.0), (2.0, 6.0)] {
         let device = Device { step, theta_max: 60.0, ..Device::default() };
         let candidates = Candidates::of(&device).unwrap();
@@ -155,21 +160,15 @@ fn fine_steps_are_left_to_materials_with_sharp_highlights() {
     let first =
         plan(&Belief::before(Some(&prior)), &[], &candidates, &cells, Goal::Count(Candidates::FEW)).unwrap();
     let next = |brdf: &dyn Brdf| {
-        let sample = |geometry: &Geometry| {
-            let [wi, wo] = geometry.directions();
-            Sample { wi, wo, value: brdf.eval(&wi, &wo) }
-        };
-        let samples: SampleSet = first.geometries.iter().map(sample).collect();
+        let samples = measured(brdf, &first.geometries);
         let options = FitOptions { prior: PriorChoice::Learned(Arc::clone(&prior)), ..FitOptions::default() };
         let model = fit(&samples, &options).unwrap().model;
         let belief = Belief::of_model(&model, &samples, &options).unwrap();
         plan(&belief, &samples.angles, &candidates, &cells, Goal::Count(10)).unwrap().geometries
     };
-    let is_coarse =
-        |g: &Geometry| [g.theta_i, g.theta_o, g.phi_o].iter().all(|angle| (angle / 5.0).fract() == 0.0);
     let named = |name: &str| materials().iter().find(|material| material.name == name).unwrap();
-    assert!(next(&named("lambert").brdf).iter().all(is_coarse));
-    assert!(!next(&named("purple-paint").brdf).iter().all(is_coarse));
+    assert!(next(&named("lambert").brdf).iter().all(is_coarse(5.0)));
+    assert!(!next(&named("purple-paint").brdf).iter().all(is_coarse(5.0)));
 }
 
 #[test]

@@ -46,7 +46,7 @@ const HEIGHT: usize = N_THETA_D * N_THETA_H;
 /// Limit on the number of blocks, far above that of any sensible file of this kind.
 const MAX_BLOCKS: usize = 1 << 20;
 
-/// The largest block in bytes: twice a whole table of three channels in `f32`.
+/// The largest block in bytes: nearly three whole tables of three channels in `f32`.
 const MAX_BLOCK_BYTES: usize = 48 << 20;
 
 /// The values of one part in MERL order, one per cell of a table.

@@ -206,7 +206,8 @@ impl Directions {
             };
             let reach = "The largest angle between detector and normal";
             degrees("Reach", 10.0..=87.0, usual.theta_max, reach, &mut look.theta_max);
-            let step = "Step of all angles; the first 20 directions are at multiples of 5 degrees";
+            let step =
+                "Step of all angles; the first 20 and those of matte materials are at multiples of 5 degrees";
             degrees("Step", 1.0..=30.0, usual.step, step, &mut look.step);
             let apart = "The smallest angle between light and detector";
             degrees("Apart", 0.0..=30.0, usual.min_separation, apart, &mut look.min_separation);
