@@ -355,7 +355,9 @@ impl User {
         self.mend();
         driver.press_with_ctrl(Key::O);
         driver.enter("Path to open", &self.folder.join("samples.csv").display().to_string());
-        driver.click("Open");
+        // A message may lie over the button.
+        driver.harness.get_by_role_and_label(Role::Button, "Open").click_accesskit();
+        driver.harness.run_steps(3);
         // Where no window is open any more, Escape would cancel the fit.
         if driver.harness.query_by_label("Path to open").is_some() {
             driver.press(Key::Escape);

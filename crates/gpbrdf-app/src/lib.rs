@@ -5,6 +5,7 @@
 
 pub mod cli;
 mod job;
+mod message;
 mod output;
 mod reproduce;
 #[cfg(feature = "viewer")]

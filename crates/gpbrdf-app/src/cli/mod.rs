@@ -33,6 +33,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::job::Observer;
+use crate::message::said_once;
 use crate::output;
 use terminal::Terminal;
 
@@ -127,7 +128,7 @@ pub fn main() -> ExitCode {
             let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
         }
         Err(error) if arguments.command.computes() => {
-            terminal.error(&one_line(&error));
+            terminal.error(&said_once(&error));
             return ExitCode::FAILURE;
         }
         Ok(_) | Err(_) => {}
@@ -157,25 +158,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if terminal::is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            terminal.error(&one_line(&error));
+            terminal.error(&said_once(&error));
             ExitCode::FAILURE
         }
     }
-}
-
-/// The causes of an error from the outside in, joined by colons. A cause is left out where the message before
-/// it already ends with it.
-fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain().map(ToString::to_string) {
-        if line.is_empty() {
-            line = cause;
-        } else if !line.ends_with(&cause) {
-            line.push_str(": ");
-            line.push_str(&cause);
-        }
-    }
-    line
 }
 
 #[cfg(test)]
@@ -185,11 +171,5 @@ mod tests {
     #[test]
     fn the_argument_definitions_are_consistent() {
         super::Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn causes_are_said_once() {
-        let error = anyhow::anyhow!("no space").context("cannot write \"a\": no space").context("stopped");
-        assert_eq!(super::one_line(&error), "stopped: cannot write \"a\": no space");
     }
 }

@@ -24,9 +24,9 @@ use self::record::{End, Line, Record};
 use super::input::open;
 use super::json::to_json_line;
 use super::making::{Making, Product, Wanted};
-use super::one_line;
 use super::terminal::Terminal;
 use crate::job::{Observer, PriorName, Run, Stage, memory_bytes};
+use crate::message::said_once;
 use crate::output::OutputFolder;
 
 /// The largest number of failed materials that the last message names.
@@ -242,7 +242,7 @@ impl Work<'_> {
         };
         line.end = self
             .files(input, &mut run, &mut line.sha256)
-            .unwrap_or_else(|error| End::Failed { error: one_line(&error) });
+            .unwrap_or_else(|error| End::Failed { error: said_once(&error) });
         line.seconds = json!(run.seconds());
         line
     }

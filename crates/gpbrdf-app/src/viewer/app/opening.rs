@@ -11,6 +11,7 @@ use gpbrdf_core::{Content, Source};
 use gpbrdf_render::is_mesh;
 
 use super::{Event, FIRST, Found, Opened, Viewer};
+use crate::message::said_once;
 use crate::viewer::state::document::Document;
 use crate::viewer::state::messages::naming;
 use crate::viewer::state::session::{SavedDocument, Session};
@@ -33,7 +34,7 @@ fn find(path: PathBuf, restore: Option<Box<SavedDocument>>) -> Result<Found, Str
         let _error_is_found_again = file.take(HEAD_BYTES).read_to_end(&mut head);
     }
     if Session::is_session(&head) {
-        let (session, note) = Session::read(&path).map_err(|error| format!("{error:#}"))?;
+        let (session, note) = Session::read(&path).map_err(|error| said_once(&error))?;
         return Ok(Found::Session(Box::new(session), note));
     }
     if is_mesh(&head) {
@@ -203,7 +204,7 @@ impl Viewer {
                 self.settings.remember(path);
                 self.context.messages.success(format!("saved session \"{}\"", path.display()));
             }
-            Err(error) => self.context.messages.error(format!("{error:#}")),
+            Err(error) => self.context.messages.error(said_once(&error)),
         }
     }
 }

@@ -15,6 +15,7 @@ use super::outbox::{Outbox, in_background};
 use super::scene::Whole;
 use super::slices::Truth;
 use crate::job::{expected_errors, plan_csv};
+use crate::message::said_once;
 use crate::viewer::state::document::Document;
 use crate::viewer::state::look::SliceLook;
 
@@ -23,7 +24,7 @@ pub(crate) type Saved = Result<String, String>;
 
 /// Writes files on a thread of its own and reports how it went.
 fn write(outbox: &Outbox<Saved>, work: impl FnOnce() -> Result<String> + Send + 'static) {
-    in_background(outbox, "writer", "cannot write", || work().map_err(|error| format!("{error:#}")));
+    in_background(outbox, "writer", "cannot write", || work().map_err(|error| said_once(&error)));
 }
 
 /// The path `name.png` with a suffix in place of its extension.

@@ -18,6 +18,7 @@ use crate::job::{
     Backend, Baking, Found, Job, Judging, LayoutChoice, Measured, ModelSpec, Observer, Run, Stage, Truth,
     is_cancelled,
 };
+use crate::message::said_once;
 use crate::viewer::state::document::{Document, DocumentId, Fitted, Work};
 
 /// What the thread reports about a document.
@@ -323,7 +324,7 @@ fn serve(
                     queue.requests.insert(0, request);
                 }
             }
-            Err(error) => report(News::Failed(format!("{error:#}"))),
+            Err(error) => report(News::Failed(said_once(&error))),
         }
     }
 }

@@ -8,6 +8,7 @@ use gpbrdf_core::{FitOptions, Model, SampleSet};
 use super::mailbox::{Mailbox, Sender};
 use super::outbox::Outbox;
 use crate::job::PriorName;
+use crate::message::said_once;
 use crate::viewer::state::document::{Document, DocumentId};
 
 /// What a plan was made from.
@@ -60,7 +61,7 @@ impl PlanRequest {
 /// Starts the thread.
 pub(crate) fn spawn(outbox: Outbox<Planned>) -> std::io::Result<Sender<PlanRequest>> {
     Mailbox::spawn("planner", move |request: PlanRequest, _stale| {
-        let plan = planned(&request).map_err(|error| format!("{error:#}"));
+        let plan = planned(&request).map_err(|error| said_once(&error));
         outbox.send(Planned { key: request.key, plan });
     })
 }
