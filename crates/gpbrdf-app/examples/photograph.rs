@@ -230,7 +230,7 @@ fn planned_measurements(name: &str, count: usize) -> Result<SampleSet> {
     let brdf = source.brdf()?;
     let candidates = Candidates::of(&Device::default())?;
     let belief = Belief::before(Some(&Prior::built_in()));
-    let cells = Cells::warped_box(Cells::COUNT)?;
+    let cells = Cells::usual(None, Cells::COUNT)?;
     let planned = plan(&belief, &[], &candidates, &cells, Goal::Count(count))?;
     let sample = |geometry: &Geometry| {
         let [wi, wo] = geometry.directions();

@@ -1,7 +1,7 @@
 //! Errors as they are shown to people.
 
-/// The causes of an error from the outside in, joined by colons. A cause is left out where the message before it already
-/// ends with it.
+/// The causes of an error from the outside in, joined by colons. A cause is left out where the message before it
+/// already ends with it.
 pub(crate) fn said_once(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain().map(ToString::to_string) {

@@ -144,10 +144,8 @@ pub(crate) fn plan(
     let measured = measured.as_ref().map(|measured| &measured.inner);
     let (found, way) = observed(py, None, |observer| {
         let candidates = Candidates::of(&device)?;
-        let cells = match environment {
-            None => Cells::warped_box(Cells::COUNT)?,
-            Some(path) => Cells::environment(&read_environment(path)?, Cells::COUNT)?,
-        };
+        let environment = environment.map(read_environment).transpose()?;
+        let cells = Cells::usual(environment.as_ref(), Cells::COUNT)?;
         let belief = match measured {
             None => Belief::before(prior.prior().as_ref()),
             Some(samples) => {

@@ -119,7 +119,7 @@ impl Gallery {
             truth: &truth,
             environment,
             device: &Device::default(),
-            cells: &Cells::warped_box(Cells::COUNT)?,
+            cells: &Cells::usual(None, Cells::COUNT)?,
             prior: self.prior.open()?.prior(),
         };
         let counts: Vec<usize> = self.count.iter().map(|&count| count as usize).collect();

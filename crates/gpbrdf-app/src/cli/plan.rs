@@ -63,8 +63,8 @@ pub(crate) struct Plan {
     #[command(flatten)]
     instrument: Instrument,
     /// Environment map (.hdr or .exr, latitude-longitude): directions count as much as a picture of a sphere in its
-    /// light uses them. Without it they count by their cosines, and more of them the nearer they are to the mirror
-    /// direction.
+    /// light uses them; without it, as one in even light does. For materials that may have a sharp highlight, half of
+    /// the weight is on directions that are the more the nearer they are to the mirror direction.
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
     /// Sequence of the directions.
@@ -205,10 +205,8 @@ impl Plan {
     }
 
     fn cells(&self) -> Result<Cells> {
-        Ok(match &self.env {
-            None => Cells::warped_box(Cells::COUNT)?,
-            Some(path) => Cells::environment(&read_environment(path)?, Cells::COUNT)?,
-        })
+        let environment = self.env.as_ref().map(read_environment).transpose()?;
+        Ok(Cells::usual(environment.as_ref(), Cells::COUNT)?)
     }
 
     /// Writes the plan.

@@ -96,7 +96,7 @@ pub(super) fn run(context: &Context) -> Result<Outcome> {
     if materials.is_empty() {
         bail!("--only prior: expected RGL measurements in --data, found none");
     }
-    let cells_of_plans = Cells::warped_box(Cells::COUNT)?;
+    let cells_of_plans = Cells::usual(None, Cells::COUNT)?;
     let device = Device::default();
     let mut all = Table::new(
         "prior-materials",

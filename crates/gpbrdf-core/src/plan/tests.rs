@@ -313,6 +313,23 @@ fn cells_of_an_environment_are_those_that_its_light_reaches() {
     let near_mirror = |cells: &Cells| cells.angles.iter().filter(|at| at.theta_h < 0.1).count();
     let warped = Cells::warped_box(1000).unwrap();
     assert!(near_mirror(&warped) > 5 * near_mirror(&even) && warped.weights.iter().all(|w| *w >= 0.0));
+    let usual = Cells::usual(None, 2000).unwrap();
+    assert_eq!(usual, even.clone().with_highlights(warped.clone()));
+    assert!((usual.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!((usual.weights[..1000].iter().sum::<f64>() - 0.5).abs() < 1e-12);
+    assert_eq!(*usual.of_material(true), usual);
+    let matte = usual.of_material(false);
+    assert_eq!(matte.angles, even.angles);
+    assert!(matte.weights.iter().zip(&even.weights).all(|(a, b)| (a - b).abs() < 1e-15));
+    let studio = Cells::usual(Some(&Environment::studio()), 2000).unwrap();
+    assert_eq!(studio, cells.with_highlights(warped.clone()));
+    assert!(Cells::usual(None, 1).is_err());
+    let far_from_mirror = |cells: &Cells| {
+        let far = cells.angles.iter().zip(&cells.weights).filter(|(at, _)| at.theta_h.to_degrees() > 30.0);
+        far.map(|(_, weight)| weight).sum::<f64>()
+    };
+    let [in_hemisphere, in_box] = [far_from_mirror(&even), far_from_mirror(&warped)];
+    assert!((in_hemisphere - 0.56).abs() < 0.03 && (in_box - 0.17).abs() < 0.03, "{in_hemisphere} {in_box}");
     let black = crate::base::raster::Raster::filled(4, 2, [0.0f32; 3]);
     assert!(Cells::environment(&Environment::new(black).unwrap(), 10).is_err());
 }

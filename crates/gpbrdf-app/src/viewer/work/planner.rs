@@ -69,7 +69,7 @@ pub(crate) fn spawn(outbox: Outbox<Planned>) -> std::io::Result<Sender<PlanReque
 fn planned(request: &PlanRequest) -> anyhow::Result<Plan> {
     let PlanKey { device, count, prior, .. } = &request.key;
     let candidates = Candidates::of(device)?;
-    let cells = Cells::warped_box(Cells::COUNT)?;
+    let cells = Cells::usual(None, Cells::COUNT)?;
     let options = FitOptions { prior: prior.open()?, ..FitOptions::default() };
     let (belief, measured) = match &request.known {
         None => (Belief::before(options.prior.prior().as_ref()), &[][..]),
