@@ -30,7 +30,7 @@ impl Cells {
 
     /// The usual ones: what a picture of a sphere in an environment uses ([`Cells::environment`]), or without one
     /// [`Cells::hemisphere`], [with](Cells::with_highlights) [`Cells::warped_box`], where highlights are. The box alone
-    /// has 62 % of its weight where `theta_h` is less than 15 degrees and 17 % beyond 30; the hemisphere has 13 and
+    /// has 56 % of its weight where `theta_h` is less than 15 degrees and 22 % beyond 30; the hemisphere has 13 and
     /// 56 % there. Plans for the box leave out much of matte materials, plans for the others miss sharp highlights.
     ///
     /// # Errors
