@@ -110,8 +110,9 @@ pub(crate) fn fit(
 /// expected error of ln f to be reached. The instrument: step of all angles (the first 20 directions and those of matte
 /// materials are at multiples of 5 degrees), incidences of the light, theta_max of the detector and min_separation
 /// between both, in degrees; in_plane keeps the detector in the plane of incidence. environment: a .hdr or .exr map in
-/// whose light the material will be seen, or None for all directions alike. prior as in fit(). Ctrl-C stops the fit to
-/// what was measured; the choice itself, which takes seconds, is finished first.
+/// whose light the material will be seen, or None for even light; highlights count as much, unless the material is
+/// matte. prior as in fit(). Ctrl-C stops the fit to what was measured; the choice itself, which takes seconds, is
+/// finished first.
 #[pyfunction]
 #[pyo3(signature = (measured=None, *, count=None, until=None, prior=Some(PathBuf::from("built-in")), step=1.0,
     incidences=None, theta_max=80.0, in_plane=false, min_separation=3.0, environment=None))]

@@ -310,7 +310,7 @@ impl Plan {
             ),
         };
         let lit = match &self.env {
-            None => "all directions, more of them the nearer to the mirror direction".to_owned(),
+            None => "a sphere in even light".to_owned(),
             Some(path) => {
                 format!("a sphere in the light of {}", path.display()).replace(char::is_control, " ")
             }
@@ -320,7 +320,7 @@ impl Plan {
             format!("instrument: {device}"),
             format!("measured: {}", known.measured),
             format!("prior: {}", known.prior),
-            format!("what counts: {lit}"),
+            format!("what counts: {lit}; highlights as much, unless the material is matte"),
             expected_errors(found),
             format!("order: {order_said}"),
         ];

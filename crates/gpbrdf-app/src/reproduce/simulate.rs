@@ -90,7 +90,7 @@ impl Trial<'_> {
             let (wi, wo) = angles.to_directions();
             Sample { wi, wo, value: self.brdf.eval(&wi, &wo) }
         };
-        let samples = Cells::hemisphere(count)?.angles.iter().map(sample).collect();
+        let samples = Cells::hemisphere(count)?.angles().iter().map(sample).collect();
         Ok(self.train("quasi-random", &samples)?.0)
     }
 

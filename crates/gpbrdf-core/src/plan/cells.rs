@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use crate::base::error::{Error, Result};
 use crate::base::random::quasi_random;
 use crate::brdf::LUMINANCE_WEIGHTS;
-use crate::brdf::angles::{BoxPoint, GRAZING_COSINE, HalfDiff, direction};
+use crate::brdf::angles::{BoxPoint, GRAZING_COSINE, HalfDiff, check_finite, direction};
 use crate::judge::Environment;
 use crate::judge::sphere::{DistantLight, ENV_PATCHES, ShadingFrame, environment_lights};
 
@@ -16,16 +16,16 @@ use crate::judge::sphere::{DistantLight, ENV_PATCHES, ShadingFrame, environment_
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
     /// The pairs of directions.
-    pub angles: Vec<HalfDiff>,
+    pub(super) angles: Vec<HalfDiff>,
     /// The weight of each of them, not negative; together 1.
-    pub weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     /// How many of the last ones count for materials with sharp highlights only.
-    pub(super) of_highlights: usize,
+    of_highlights: usize,
 }
 
 impl Cells {
-    /// The usual number of them. With half of it the weight of each is so large that plans for matte materials are led
-    /// to single cells.
+    /// The usual number of them. With half of it, up to 42 planned directions describe matte materials by 3 to 5 dB
+    /// worse.
     pub const COUNT: usize = 4000;
 
     /// The usual ones: what a picture of a sphere in an environment uses ([`Cells::environment`]), or without one
@@ -132,14 +132,28 @@ impl Cells {
         Cow::Owned(Self { angles, weights, of_highlights: 0 })
     }
 
-    fn new(pairs: Vec<(HalfDiff, f64)>) -> Result<Self> {
-        let total: f64 = pairs.iter().map(|(_, weight)| weight).sum();
-        if !(total > 0.0) {
-            return Err(Error::argument("cells of a plan", "at least one with a weight", pairs.len()));
-        }
+    /// Pairs of directions and how much each of them counts, in any unit.
+    ///
+    /// # Errors
+    /// Angles and weights that are not finite, negative weights, and none above 0.
+    pub fn new(pairs: Vec<(HalfDiff, f64)>) -> Result<Self> {
         let (angles, weights): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+        check_finite(&angles)?;
+        if let Some(bad) = weights.iter().find(|weight| !(**weight >= 0.0 && weight.is_finite())) {
+            return Err(Error::argument("weight of a cell", "a finite number of at least 0", bad));
+        }
+        let total: f64 = weights.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return Err(Error::argument("cells of a plan", "at least one with a weight", weights.len()));
+        }
         let weights = weights.into_iter().map(|weight| weight / total).collect();
         Ok(Self { angles, weights, of_highlights: 0 })
+    }
+
+    /// The pairs of directions.
+    #[must_use]
+    pub fn angles(&self) -> &[HalfDiff] {
+        &self.angles
     }
 
     /// The number of pairs.

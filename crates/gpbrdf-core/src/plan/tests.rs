@@ -72,8 +72,8 @@ fn expected_errors_are_those_of_the_conditioned_process() {
                 let chromatic = Belief { prior: None, scale: 1.0, ..Belief::of_fit(&hyper, prior).unwrap() };
                 // Intervals of the model are calibrated as a whole.
                 let factors = belief.calibration(&cells.angles);
-                let weights = cells.weights.iter().zip(factors).map(|(w, factor)| w * factor).collect();
-                let calibrated = Cells { weights, ..cells.clone() };
+                let mut calibrated = cells.clone();
+                calibrated.weights.iter_mut().zip(factors).for_each(|(weight, factor)| *weight *= factor);
                 let chromatic = expected_error(&chromatic, &samples.angles, &calibrated).unwrap().powi(2);
                 expected -= 2.0 / 3.0 * chromatic;
             }
@@ -324,6 +324,14 @@ fn cells_of_an_environment_are_those_that_its_light_reaches() {
     let studio = Cells::usual(Some(&Environment::studio()), 2000).unwrap();
     assert_eq!(studio, cells.with_highlights(warped.clone()));
     assert!(Cells::usual(None, 1).is_err());
+    let at = even.angles()[0];
+    let bad = HalfDiff { theta_h: f64::NAN, ..at };
+    for pairs in
+        [vec![], vec![(at, 0.0)], vec![(at, 1.0), (at, -1e-9)], vec![(at, f64::INFINITY)], vec![(bad, 1.0)]]
+    {
+        assert!(Cells::new(pairs).is_err());
+    }
+    assert_eq!(Cells::new(vec![(at, 3.0), (at, 1.0)]).unwrap().weights, [0.75, 0.25]);
     let far_from_mirror = |cells: &Cells| {
         let far = cells.angles.iter().zip(&cells.weights).filter(|(at, _)| at.theta_h.to_degrees() > 30.0);
         far.map(|(_, weight)| weight).sum::<f64>()
