@@ -38,8 +38,19 @@ pub struct Belief {
     pub(super) noise_variance: f64,
     /// The variance of `ln f`, mean of the channels, per variance of the process.
     pub(super) scale: f64,
-    /// Whether some highlight may be too sharp for coarse steps of an instrument.
-    pub(super) may_be_sharp: bool,
+    /// What is known of the highlights.
+    pub(super) highlights: Highlights,
+}
+
+/// What is known of the highlights of a material.
+#[derive(Clone, Debug)]
+pub(super) enum Highlights {
+    /// Nothing: some may be too sharp for coarse steps of an instrument.
+    Unknown,
+    /// None of them is sharp.
+    Broad,
+    /// Some are sharp, as this model says.
+    Sharp(Box<Model>),
 }
 
 impl Belief {
@@ -58,7 +69,7 @@ impl Belief {
             space,
             noise_variance: NOISE,
             scale: scale(prior.is_some()),
-            may_be_sharp: true,
+            highlights: Highlights::Unknown,
         }
     }
 
@@ -89,12 +100,13 @@ impl Belief {
             kernel: hyper.kernel.clone(),
             space,
             noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
-            may_be_sharp: true,
+            highlights: Highlights::Unknown,
         })
     }
 
     /// What is known with a model that was fitted to samples with these options. Beside its variances this is whether
-    /// the model has a sharp highlight, without which measurements near mirror directions tell little.
+    /// the model has a sharp highlight, without which measurements near mirror directions tell little, and how bright
+    /// it is in which directions of one.
     ///
     /// # Errors
     /// A model without hyper-parameters, and those of [`Belief::of_fit`].
@@ -102,8 +114,15 @@ impl Belief {
         let Some(hyper) = model.hyper() else {
             return Err(Error::argument("model of a plan", "one with hyper-parameters", "none"));
         };
-        let may_be_sharp = has_sharp_highlight(model);
-        Ok(Self { may_be_sharp, ..Self::of_fit(&hyper, options.prior(samples).as_ref())? })
+        let is_sharp = has_sharp_highlight(model);
+        let highlights =
+            if is_sharp { Highlights::Sharp(Box::new(model.clone())) } else { Highlights::Broad };
+        Ok(Self { highlights, ..Self::of_fit(&hyper, options.prior(samples).as_ref())? })
+    }
+
+    /// Whether some highlight may be too sharp for coarse steps of an instrument.
+    pub(super) fn may_be_sharp(&self) -> bool {
+        !matches!(self.highlights, Highlights::Broad)
     }
 
     /// The factors by which variances at directions are larger than the process says: those of the intervals of a fit.

@@ -5,12 +5,18 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::Vector3;
 
+use super::belief::Highlights;
+use super::candidates::Candidates;
 use crate::base::error::{Error, Result};
 use crate::base::random::quasi_random;
-use crate::brdf::LUMINANCE_WEIGHTS;
-use crate::brdf::angles::{BoxPoint, GRAZING_COSINE, HalfDiff, check_finite, direction};
+use crate::brdf::angles::{BoxPoint, GRAZING_COSINE, HalfDiff, check_finite, direction, theta_d_max};
+use crate::brdf::{LUMINANCE_WEIGHTS, Rgb};
 use crate::judge::Environment;
 use crate::judge::sphere::{DistantLight, ENV_PATCHES, ShadingFrame, environment_lights};
+use crate::model::Model;
+
+/// The share of the energy that a model reflects in the weights of its highlights; the rest is spread evenly.
+const OF_ENERGY: f64 = 0.8;
 
 /// Directions with weights.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +35,12 @@ impl Cells {
     pub const COUNT: usize = 4000;
 
     /// The usual ones: what a picture of a sphere in an environment uses ([`Cells::environment`]), or without one
-    /// [`Cells::hemisphere`], [with](Cells::with_highlights) [`Cells::warped_box`], where highlights are. The box alone
-    /// has 56 % of its weight where `theta_h` is less than 15 degrees and 22 % beyond 30; the hemisphere has 13 and
-    /// 56 % there. Plans for the box leave out much of matte materials, plans for the others miss sharp highlights.
+    /// [`Cells::hemisphere`], and as many of [`Cells::warped_box`], where highlights are. The box alone has 56 % of its
+    /// weight where `theta_h` is less than 15 degrees and 22 % beyond 30; the hemisphere has 13 and 56 % there. Plans
+    /// for the box leave out much of matte materials, plans for the others miss sharp highlights. Those of the box do
+    /// not count for materials without a sharp highlight, and once a few directions of one with a sharp highlight are
+    /// measured, those of the box count mostly by the energy that its model reflects there: the same relative error of
+    /// `f` is seen least where a highlight ends.
     ///
     /// # Errors
     /// A count of less than 2, and an environment that is black.
@@ -109,27 +118,40 @@ impl Cells {
         Self::new(drawn.take(count).collect())
     }
 
-    /// These directions and others that count only for materials which may have a sharp highlight, as far as is known:
-    /// for those either have half of the weight, for the rest these have all of it.
-    #[must_use]
-    pub fn with_highlights(mut self, others: Self) -> Self {
-        self.of_highlights += others.len();
-        self.angles.extend(others.angles);
-        self.weights.extend(others.weights);
+    /// These directions and those of the warped box, which count only for materials that may have a sharp highlight, as
+    /// far as is known: for those either have half of the weight, for the rest these have all of it.
+    pub(super) fn with_highlights(mut self, in_box: Self) -> Self {
+        self.of_highlights += in_box.len();
+        self.angles.extend(in_box.angles);
+        self.weights.extend(in_box.weights);
         self.weights.iter_mut().for_each(|weight| *weight *= 0.5);
         self
     }
 
-    /// Those that count for a material.
-    pub(super) fn of_material(&self, may_be_sharp: bool) -> Cow<'_, Self> {
-        if may_be_sharp || self.of_highlights == 0 {
-            return Cow::Borrowed(self);
-        }
+    /// Those that count for a material of which this number of directions is measured.
+    pub(super) fn of_material(&self, highlights: &Highlights, measured: usize) -> Cow<'_, Self> {
         let rest = self.len() - self.of_highlights;
-        let (angles, mut weights) = (self.angles[..rest].to_vec(), self.weights[..rest].to_vec());
-        let total: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|weight| *weight /= total);
-        Cow::Owned(Self { angles, weights, of_highlights: 0 })
+        match highlights {
+            Highlights::Broad if self.of_highlights > 0 => {
+                let (angles, mut weights) = (self.angles[..rest].to_vec(), self.weights[..rest].to_vec());
+                let total: f64 = weights.iter().sum();
+                weights.iter_mut().for_each(|weight| *weight /= total);
+                Cow::Owned(Self { angles, weights, of_highlights: 0 })
+            }
+            Highlights::Sharp(model) if measured >= Candidates::FEW => {
+                let mut cells = self.clone();
+                let (angles, weights) = (&cells.angles[rest..], &mut cells.weights[rest..]);
+                let energies = reflected_energies(model, angles, weights);
+                let (share, total) = (weights.iter().sum::<f64>(), energies.iter().sum::<f64>());
+                if share > 0.0 && total > 0.0 && total.is_finite() {
+                    for (weight, energy) in weights.iter_mut().zip(&energies) {
+                        *weight = (1.0 - OF_ENERGY) * *weight + OF_ENERGY * share * energy / total;
+                    }
+                }
+                Cow::Owned(cells)
+            }
+            _ => Cow::Borrowed(self),
+        }
     }
 
     /// Pairs of directions and how much each of them counts, in any unit.
@@ -167,4 +189,18 @@ impl Cells {
     pub fn is_empty(&self) -> bool {
         self.angles.is_empty()
     }
+}
+
+/// The energy that a model reflects about each direction of the warped box in evenly lit surroundings, in any unit, for
+/// directions with weights of `cos theta_i cos theta_o`: these times `f`, mean of the channels, and times
+/// `dw_i dw_o / (du dv dphi)`, which is proportional to `cos theta_d sin theta_d theta_d_max sin theta_h
+/// sqrt(theta_h)`, since `dw_o = 4 cos theta_d dw_h` and `theta_h` goes with the square of `u`.
+pub(super) fn reflected_energies(model: &Model, angles: &[HalfDiff], weights: &[f64]) -> Vec<f64> {
+    let brightness = model.predict_mean(angles);
+    let energy = |((at, weight), f): ((&HalfDiff, &f64), &Rgb)| {
+        let (sin_h, (sin_d, cos_d)) = (at.theta_h.sin(), at.theta_d.sin_cos());
+        let measure = cos_d * sin_d * theta_d_max(at.theta_h, at.phi_d) * sin_h * at.theta_h.sqrt();
+        (weight * measure * f.iter().sum::<f64>()).max(0.0)
+    };
+    angles.iter().zip(weights).zip(&brightness).map(energy).collect()
 }

@@ -44,7 +44,7 @@ pub struct Plan {
 /// Chooses directions among `candidates` one by one. With `C` the covariance given all measurements and choices so far
 /// and `s` the noise variance, the next one, `j`, has the largest `sum_i w_i C_ij^2 / (C_jj + s)` over the cells `i`:
 /// what it takes from the weighted variance of the cells. Cells of highlights count where the belief allows for sharp
-/// ones only.
+/// ones only, and once [`Candidates::FEW`] directions are measured mostly by the energy that its model reflects there.
 ///
 /// Source: A. Krause, A. Singh and C. Guestrin, "Near-Optimal Sensor Placements in Gaussian Processes" (JMLR 9, 2008)
 /// for greedy choices; the criterion is that of D. A. Cohn, Z. Ghahramani and M. I. Jordan, "Active Learning with
@@ -72,8 +72,8 @@ pub fn plan(
     {
         return Err(Error::argument("error of a plan", "a positive number", error));
     }
-    let cells = &*cells.of_material(belief.may_be_sharp);
-    let few = if belief.may_be_sharp { Candidates::FEW.saturating_sub(measured.len()) } else { usize::MAX };
+    let cells = &*cells.of_material(&belief.highlights, measured.len());
+    let few = if belief.may_be_sharp() { Candidates::FEW.saturating_sub(measured.len()) } else { usize::MAX };
     let mut found = Plan { geometries: Vec::new(), errors: Vec::new() };
     if few > 0 && !candidates.coarse.is_empty() {
         found.extend(State::new(belief, measured, &candidates.coarse, cells)?, &candidates.coarse, goal, few);
@@ -141,7 +141,8 @@ pub fn expected_error(belief: &Belief, measured: &[HalfDiff], cells: &Cells) -> 
     if cells.is_empty() {
         return Err(Error::argument("cells of a plan", "at least one", 0));
     }
-    Ok(State::new(belief, measured, &[], &cells.of_material(belief.may_be_sharp))?.error())
+    let cells = cells.of_material(&belief.highlights, measured.len());
+    Ok(State::new(belief, measured, &[], &cells)?.error())
 }
 
 /// The covariance given measurements and choices.

@@ -1,5 +1,7 @@
 use std::sync::Arc;
 
+use super::belief::Highlights;
+use super::cells::reflected_energies;
 use super::*;
 use crate::brdf::{angles::HalfDiff, materials};
 use crate::gp::Solver;
@@ -172,6 +174,42 @@ fn fine_steps_are_left_to_materials_with_sharp_highlights() {
 }
 
 #[test]
+fn highlights_count_by_the_energy_that_a_model_reflects() {
+    let model = |name: &str| {
+        let material = materials().iter().find(|material| material.name == name).unwrap();
+        let reached = coarse().geometries(MOST).unwrap();
+        let samples = measured(&material.brdf, &reached);
+        let options = FitOptions { prior: PriorChoice::None, ..FitOptions::default() };
+        (fit(&samples, &options).unwrap().model, samples, options)
+    };
+    // A white surface reflects as much of it far from the mirror direction as evenly spread directions have there.
+    let (white, samples, options) = model("lambert");
+    let (even, in_box) = (Cells::hemisphere(20_000).unwrap(), Cells::warped_box(20_000).unwrap());
+    let energies = reflected_energies(&white, in_box.angles(), &in_box.weights);
+    for limit in [10.0, 20.0, 30.0, 45.0f64] {
+        let share = |cells: &Cells, weights: &[f64]| {
+            let within = cells.angles.iter().zip(weights).filter(|(at, _)| at.theta_h.to_degrees() < limit);
+            within.map(|(_, w)| w).sum::<f64>() / weights.iter().sum::<f64>()
+        };
+        let (expected, found) = (share(&even, &even.weights), share(&in_box, &energies));
+        assert!((found - expected).abs() < 0.02, "{limit}: {found} {expected}");
+    }
+    assert!(matches!(Belief::of_model(&white, &samples, &options).unwrap().highlights, Highlights::Broad));
+
+    let (glossy, samples, options) = model("purple-paint");
+    let highlights = Belief::of_model(&glossy, &samples, &options).unwrap().highlights;
+    assert!(matches!(highlights, Highlights::Sharp(_)));
+    let usual = Cells::usual(None, 2000).unwrap();
+    assert_eq!(*usual.of_material(&highlights, Candidates::FEW - 1), usual);
+    let weighted = usual.of_material(&highlights, Candidates::FEW);
+    assert_eq!(weighted.weights[..1000], usual.weights[..1000]);
+    assert!((weighted.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    // Where the model reflects next to nothing, a fifth of the weight stays.
+    let least = weighted.weights.iter().zip(&usual.weights).map(|(w, u)| w / u).fold(f64::INFINITY, f64::min);
+    assert!((0.2..0.5).contains(&least), "{least}");
+}
+
+#[test]
 fn plans_end_with_their_goal_or_say_how_far_they_get() {
     let candidates = Candidates::from(coarse().geometries(MOST).unwrap());
     let cells = Cells::hemisphere(200).unwrap();
@@ -317,8 +355,8 @@ fn cells_of_an_environment_are_those_that_its_light_reaches() {
     assert_eq!(usual, even.clone().with_highlights(warped.clone()));
     assert!((usual.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     assert!((usual.weights[..1000].iter().sum::<f64>() - 0.5).abs() < 1e-12);
-    assert_eq!(*usual.of_material(true), usual);
-    let matte = usual.of_material(false);
+    assert_eq!(*usual.of_material(&Highlights::Unknown, 100), usual);
+    let matte = usual.of_material(&Highlights::Broad, 100);
     assert_eq!(matte.angles, even.angles);
     assert!(matte.weights.iter().zip(&even.weights).all(|(a, b)| (a - b).abs() < 1e-15));
     let studio = Cells::usual(Some(&Environment::studio()), 2000).unwrap();
