@@ -50,4 +50,7 @@ pub struct FitReport {
     /// The weight of each sample: its noise variance is that of all samples divided by the weight. Empty where
     /// all weights are 1.
     pub weights: Vec<f64>,
+    /// With a learned prior: the log marginal likelihood of the brightness of the samples with the prior, less that of
+    /// a stationary process alone; `None` without a prior.
+    pub evidence_of_prior: Option<f64>,
 }

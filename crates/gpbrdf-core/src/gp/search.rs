@@ -11,9 +11,9 @@ use crate::kernel::{AxisMetric, Kernel, KernelBody, KernelTerm, ParameterKind, S
 const NOISE_PRIOR: (f64, f64) = (2.5e-5, 2.5);
 
 /// The prior of the noise variance of `ln f` where basis functions are learned: measurements are usually good to 1 %,
-/// within a factor of 3 or so. It is tighter than the other since a few samples of a highlight that is sharper than any
+/// within a factor of 2 or so. It is tighter than the other since a few samples of a highlight that is sharper than any
 /// of the library look like noise.
-const NOISE_PRIOR_OF_LOG: (f64, f64) = (1e-4, 1.0);
+const NOISE_PRIOR_OF_LOG: (f64, f64) = (1e-4, 0.5);
 
 /// Length scales and noise variances of the points from which a search may start, relative to the usual ones.
 const LENGTH_FACTORS: [f64; 3] = [1.0, 0.3, 0.1];

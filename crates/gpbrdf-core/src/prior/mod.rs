@@ -93,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "16c20b2320d35860a69dd330fc4d09462fe8cc2c761a2ff3852f8eff6ab8b51a";
+    pub const BUILT_IN_SHA256: &str = "31b8401923e347a8024eab56bf73ce4350471d530c2f55b56e79c3737b0565dc";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]

@@ -29,7 +29,8 @@ const MOST_COMPARED: usize = 512;
 /// channels, whose prior mean is the prior's own.
 ///
 /// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
-/// that the samples resemble.
+/// that the samples resemble. A third fit without a prior says what the prior is worth
+/// ([`FitReport::evidence_of_prior`]).
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     if problem.factorises {
         problem.refuse_known_noise()?;
@@ -37,10 +38,11 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
         let cost = dense_cost(problem.angles.len(), 3, EVALUATIONS);
         FitCost { bytes: 2.0 * cost.bytes, ..cost }.check()?;
     }
-    // Three fits of about the same length.
+    // Four fits of about the same length.
+    let part = |nth: f64| problem.watch.part(nth / 4.0, (nth + 1.0) / 4.0);
     let fit_colour = |nth: f64, prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
-        let watch = &problem.watch.part(nth / 3.0, (nth + 1.0) / 3.0);
+        let watch = &part(nth);
         fit_process(&Problem { space, watch, ..of_colour(problem, prior, colour, &features) })
     };
     let (first, first_report) = fit_colour(0.0, prior, Colour::Achromatic, problem.space)?;
@@ -50,8 +52,23 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     bright_report.evaluations += first_report.evaluations;
     // The chromatic colours take the space of the achromatic one.
     let (coloured, coloured_report) = fit_colour(2.0, &adapted, Colour::Chromatic, Some(bright.space))?;
+    let watch = &part(3.0);
+    let (_, without) = fit_process(&Problem { watch, ..of_brightness_alone(problem) })?;
+    let evidence = bright_report.log_marginal_likelihood - without.log_marginal_likelihood;
     let posterior = posterior(problem, prior, (weights, adapted), vec![bright, coloured])?;
-    Ok((posterior, combined(&[bright_report, coloured_report])))
+    let report = combined(&[bright_report, coloured_report]);
+    Ok((posterior, FitReport { evidence_of_prior: Some(evidence), ..report }))
+}
+
+/// The achromatic colour as a stationary process about its mean over the samples.
+fn of_brightness_alone<'a>(problem: &Problem<'a>) -> Problem<'a> {
+    let n = problem.angles.len();
+    let mut brightness: Vec<f64> = (0..n).map(|i| colours_of(problem, i)[0]).collect();
+    let mean = brightness.iter().sum::<f64>() / n as f64;
+    brightness.iter_mut().for_each(|y| *y -= mean);
+    // The sum of three alike channels over the root of 3.
+    let usual_variance = problem.usual_variance.map(|of_channel| 3.0 * of_channel);
+    Problem { targets: vec![brightness], usual_variance, basis: None, ..problem.clone() }
 }
 
 /// How much the samples resemble each material of the library, as weights with a sum of 1: the likelihood of the
@@ -194,6 +211,7 @@ fn combined(reports: &[FitReport]) -> FitReport {
         at_bound: at_bound.collect(),
         leave_one_out: left_out(reports),
         weights,
+        evidence_of_prior: None,
     }
 }
 
