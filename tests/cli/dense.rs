@@ -52,7 +52,9 @@ fn scattered_layouts_are_seeded() {
         let arguments = ["--layout", layout, "--samples", "60", "--seed", seed, "-o", name];
         let report = cli.json(&[&["fit", "phong", "--json"], &arguments[..]].concat());
         assert_eq!((&report["samples"], &report["layout"]), (&60.into(), &layout.into()));
-        assert_eq!((&report["solver"], report["lattice"].is_null()), (&"learned".into(), true));
+        // With the prior or without, as the samples say.
+        assert!(report["solver"] == "learned" || report["solver"] == "scattered", "{report:#}");
+        assert!(report["lattice"].is_null());
         cli.read(name)
     };
     for layout in ["random", "cells"] {

@@ -50,7 +50,8 @@ pub struct FitReport {
     /// The weight of each sample: its noise variance is that of all samples divided by the weight. Empty where
     /// all weights are 1.
     pub weights: Vec<f64>,
-    /// With a learned prior: the log marginal likelihood of the brightness of the samples with the prior, less that of
-    /// a stationary process alone; `None` without a prior.
+    /// With a learned prior: the log marginal likelihood of the brightness of `n` samples with the prior, less that of
+    /// a stationary process about their mean, plus `ln(n) / 2` for that mean, which is a parameter more (G. Schwarz,
+    /// "Estimating the Dimension of a Model", 1978); `None` without a prior.
     pub evidence_of_prior: Option<f64>,
 }

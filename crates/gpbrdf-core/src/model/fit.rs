@@ -190,9 +190,10 @@ pub struct Conditioned {
 
 /// Fits a model to samples: transforms their values to targets, finds hyper-parameters by maximum marginal
 /// likelihood, and conditions the process at them. Where a prior is to be used ([`FitOptions::prior`]), a model
-/// without it is fitted as well. The one with the prior is taken if its marginal likelihood is larger, and that of its
-/// brightness alone is ([`FitReport::evidence_of_prior`]): channels that are correlated are likelier than independent
-/// ones whatever the prior says of highlights.
+/// without it is fitted as well. The one with the prior is taken if its marginal likelihood is larger. For samples that
+/// are neither on a lattice nor in the plane of incidence that of the brightness alone must be larger, too
+/// ([`FitReport::evidence_of_prior`]): channels that are correlated are likelier than independent ones whatever the
+/// prior says of highlights. Few nodes and scans say too little of the directions between them.
 ///
 /// # Errors
 /// No samples, values that are not finite, invalid options, the lattice solver for samples off a lattice, a
@@ -205,9 +206,9 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     let own_mean = options.with_mean_of(Some(&prior));
     let with = fit_with(samples, &own_mean, Some(&prior), &watch.part(0.0, SHARE_WITH_PRIOR))?;
     let without = fit_with(samples, options, None, &watch.part(SHARE_WITH_PRIOR, 1.0))?;
-    let of_brightness = with.reports.iter().filter_map(|report| report.evidence_of_prior).sum::<f64>();
-    let is_better =
-        of_brightness >= 0.0 && with.log_marginal_likelihood() >= without.log_marginal_likelihood();
+    let evidence = with.reports.iter().filter_map(|report| report.evidence_of_prior).sum::<f64>();
+    let is_refuted = evidence < 0.0 && samples.lattice().is_none() && !samples.is_in_plane();
+    let is_better = !is_refuted && with.log_marginal_likelihood() >= without.log_marginal_likelihood();
     Ok(if is_better { with } else { without })
 }
 

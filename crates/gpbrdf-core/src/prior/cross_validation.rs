@@ -13,7 +13,7 @@ use crate::brdf::Rgb;
 use crate::brdf::angles::HalfDiff;
 use crate::model::{FitOptions, IntervalOf, PriorChoice, fit};
 use crate::sample::layout::hemisphere_directions;
-use crate::sample::{InPlaneScan, Sample, SampleSet};
+use crate::sample::{InPlaneScan, MeanFunction, Sample, SampleSet};
 
 /// The number of parts of a library that are left out in turn.
 pub(super) const FOLDS: usize = 8;
@@ -87,7 +87,8 @@ pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<C
 type Errors = Vec<(HalfDiff, f64)>;
 
 /// The errors of a material's prediction from samples in these directions, at the centres, where its values are
-/// `truth`, in standard deviations.
+/// `truth`, in standard deviations;
+/// none where the samples are likelier without the prior.
 fn errors_of(
     (library, material): (&Library, usize),
     truth: &[Rgb],
@@ -99,6 +100,10 @@ fn errors_of(
     let samples: SampleSet =
         pairs.into_iter().zip(values).map(|([wi, wo], value)| Sample { wi, wo, value }).collect();
     let model = fit(&samples, options)?.model;
+    if model.mean != MeanFunction::Learned {
+        // The intervals of fits without the prior are their own.
+        return Ok(Errors::new());
+    }
     let centres = library.centres();
     let predicted = model.predict_target(centres);
     let variances = model.predict_variance(centres, IntervalOf::Latent)?;

@@ -93,7 +93,7 @@ impl Prior {
     pub const TRANSFORM: Transform = Transform::Log { epsilon: LOG_EPSILON };
 
     /// SHA-256 sum of the file of [`Prior::built_in`].
-    pub const BUILT_IN_SHA256: &str = "31b8401923e347a8024eab56bf73ce4350471d530c2f55b56e79c3737b0565dc";
+    pub const BUILT_IN_SHA256: &str = "c863f347b28cd53665effb1c897919f19b5466b606850fd68aa860068f9d0ff0";
 
     /// The prior that comes with this crate. `assets/README.md` names its sources.
     #[must_use]

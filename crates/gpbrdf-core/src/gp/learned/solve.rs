@@ -54,7 +54,8 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     let (coloured, coloured_report) = fit_colour(2.0, &adapted, Colour::Chromatic, Some(bright.space))?;
     let watch = &part(3.0);
     let (_, without) = fit_process(&Problem { watch, ..of_brightness_alone(problem) })?;
-    let evidence = bright_report.log_marginal_likelihood - without.log_marginal_likelihood;
+    let of_mean = 0.5 * (problem.angles.len() as f64).ln();
+    let evidence = bright_report.log_marginal_likelihood - without.log_marginal_likelihood + of_mean;
     let posterior = posterior(problem, prior, (weights, adapted), vec![bright, coloured])?;
     let report = combined(&[bright_report, coloured_report]);
     Ok((posterior, FitReport { evidence_of_prior: Some(evidence), ..report }))
