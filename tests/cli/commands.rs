@@ -156,7 +156,8 @@ fn samples_go_out_come_back_and_judge_a_model() {
     );
 
     let report = cli.json(&["bake", "s.csv", "-o", "out", "--json"]);
-    assert_eq!((&report["solver"], &report["layout"]), (&"learned".into(), &"samples".into()));
+    // The brightness is likelier without the prior.
+    assert_eq!((&report["solver"], &report["layout"]), (&"scattered".into(), &"samples".into()));
     assert!(report["metrics"].is_null(), "samples have no table to compare with");
     assert_eq!(cli.names("out").len(), 6);
     let against_table = cli.json(&["eval", "out/model.safetensors", "cook-torrance", "--json"]);
