@@ -52,9 +52,8 @@ fn scattered_layouts_are_seeded() {
         let arguments = ["--layout", layout, "--samples", "60", "--seed", seed, "-o", name];
         let report = cli.json(&[&["fit", "phong", "--json"], &arguments[..]].concat());
         assert_eq!((&report["samples"], &report["layout"]), (&60.into(), &layout.into()));
-        // With the prior or without, as the samples say.
-        assert!(report["solver"] == "learned" || report["solver"] == "scattered", "{report:#}");
-        assert!(report["lattice"].is_null());
+        // The brightness is likelier without the prior.
+        assert_eq!((&report["solver"], report["lattice"].is_null()), (&"scattered".into(), true));
         cli.read(name)
     };
     for layout in ["random", "cells"] {

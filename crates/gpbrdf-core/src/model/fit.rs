@@ -20,7 +20,7 @@ const FEW_SAMPLES: usize = 250;
 /// directions.
 const MANY_SAMPLES: usize = 20_000;
 
-/// The share of three fits with a prior in the time of these and of one without.
+/// The share of the four searches of a fit with a prior in the time of these and of one without.
 const SHARE_WITH_PRIOR: f64 = 0.75;
 
 /// What is known of other materials.

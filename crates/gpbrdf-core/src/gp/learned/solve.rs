@@ -15,6 +15,7 @@ use crate::gp::scattered::cost::EVALUATIONS;
 use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
 use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
+use crate::sample::MeanFunction;
 
 /// Deviation of the brightness by which a material may differ from one of the library that it is like.
 const BRIGHTNESS: f64 = 0.5;
@@ -65,7 +66,7 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
 fn of_brightness_alone<'a>(problem: &Problem<'a>) -> Problem<'a> {
     let n = problem.angles.len();
     let mut brightness: Vec<f64> = (0..n).map(|i| colours_of(problem, i)[0]).collect();
-    let mean = brightness.iter().sum::<f64>() / n as f64;
+    let mean = MeanFunction::Constant.offset(&brightness);
     brightness.iter_mut().for_each(|y| *y -= mean);
     // The sum of three alike channels over the root of 3.
     let usual_variance = problem.usual_variance.map(|of_channel| 3.0 * of_channel);
