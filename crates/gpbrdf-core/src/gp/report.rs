@@ -52,6 +52,7 @@ pub struct FitReport {
     pub weights: Vec<f64>,
     /// With a learned prior: the log marginal likelihood of the brightness of `n` samples with the prior, less that of
     /// a stationary process about their mean, plus `ln(n) / 2` for that mean, which is a parameter more (G. Schwarz,
-    /// "Estimating the Dimension of a Model", 1978); `None` without a prior.
+    /// "Estimating the Dimension of a Model", 1978); `None` without a prior, and for samples on a lattice or in the
+    /// plane of incidence, for which it decides nothing.
     pub evidence_of_prior: Option<f64>,
 }

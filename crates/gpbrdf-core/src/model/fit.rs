@@ -20,7 +20,7 @@ const FEW_SAMPLES: usize = 250;
 /// directions.
 const MANY_SAMPLES: usize = 20_000;
 
-/// The share of the four searches of a fit with a prior in the time of these and of one without.
+/// The share of the searches of a fit with a prior in the time of these and of one without.
 const SHARE_WITH_PRIOR: f64 = 0.75;
 
 /// What is known of other materials.
@@ -206,8 +206,7 @@ pub fn fit(samples: &SampleSet, options: &FitOptions) -> Result<Fit> {
     let own_mean = options.with_mean_of(Some(&prior));
     let with = fit_with(samples, &own_mean, Some(&prior), &watch.part(0.0, SHARE_WITH_PRIOR))?;
     let without = fit_with(samples, options, None, &watch.part(SHARE_WITH_PRIOR, 1.0))?;
-    let evidence = with.reports.iter().filter_map(|report| report.evidence_of_prior).sum::<f64>();
-    let is_refuted = evidence < 0.0 && samples.lattice().is_none() && !samples.is_in_plane();
+    let is_refuted = with.reports.iter().filter_map(|report| report.evidence_of_prior).any(|gain| gain < 0.0);
     let is_better = !is_refuted && with.log_marginal_likelihood() >= without.log_marginal_likelihood();
     Ok(if is_better { with } else { without })
 }

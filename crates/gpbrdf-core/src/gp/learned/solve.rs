@@ -16,6 +16,7 @@ use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
 use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
 use crate::sample::MeanFunction;
+use crate::sample::blind_spots::is_in_plane;
 
 /// Deviation of the brightness by which a material may differ from one of the library that it is like.
 const BRIGHTNESS: f64 = 0.5;
@@ -30,7 +31,8 @@ const MOST_COMPARED: usize = 512;
 /// channels, whose prior mean is the prior's own.
 ///
 /// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
-/// that the samples resemble. A third fit without a prior says what the prior is worth
+/// that the samples resemble. For samples that are neither on a lattice nor in the plane of incidence, which say most
+/// of the directions between them, another fit of it without a prior says what the prior is worth
 /// ([`FitReport::evidence_of_prior`]).
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     if problem.factorises {
@@ -39,8 +41,11 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
         let cost = dense_cost(problem.angles.len(), 3, EVALUATIONS);
         FitCost { bytes: 2.0 * cost.bytes, ..cost }.check()?;
     }
-    // Four fits of about the same length.
-    let part = |nth: f64| problem.watch.part(nth / 4.0, (nth + 1.0) / 4.0);
+    let in_plane = || problem.angles.iter().all(|at| is_in_plane(*at));
+    let is_spread = problem.lattice.is_none() && !in_plane();
+    // Fits of about the same length.
+    let fits = if is_spread { 4.0 } else { 3.0 };
+    let part = |nth: f64| problem.watch.part(nth / fits, (nth + 1.0) / fits);
     let fit_colour = |nth: f64, prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
         let watch = &part(nth);
@@ -53,13 +58,17 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     bright_report.evaluations += first_report.evaluations;
     // The chromatic colours take the space of the achromatic one.
     let (coloured, coloured_report) = fit_colour(2.0, &adapted, Colour::Chromatic, Some(bright.space))?;
-    let watch = &part(3.0);
-    let (_, without) = fit_process(&Problem { watch, ..of_brightness_alone(problem) })?;
-    let of_mean = 0.5 * (problem.angles.len() as f64).ln();
-    let evidence = bright_report.log_marginal_likelihood - without.log_marginal_likelihood + of_mean;
+    let mut evidence_of_prior = None;
+    if is_spread {
+        let watch = &part(3.0);
+        let (_, without) = fit_process(&Problem { watch, ..of_brightness_alone(problem) })?;
+        let of_mean = 0.5 * (problem.angles.len() as f64).ln();
+        let gain = bright_report.log_marginal_likelihood - without.log_marginal_likelihood;
+        evidence_of_prior = Some(gain + of_mean);
+    }
     let posterior = posterior(problem, prior, (weights, adapted), vec![bright, coloured])?;
     let report = combined(&[bright_report, coloured_report]);
-    Ok((posterior, FitReport { evidence_of_prior: Some(evidence), ..report }))
+    Ok((posterior, FitReport { evidence_of_prior, ..report }))
 }
 
 /// The achromatic colour as a stationary process about its mean over the samples.
