@@ -43,7 +43,8 @@ pub struct Plan {
 
 /// Chooses directions among `candidates` one by one. With `C` the covariance given all measurements and choices so far
 /// and `s` the noise variance, the next one, `j`, has the largest `sum_i w_i C_ij^2 / (C_jj + s)` over the cells `i`:
-/// what it takes from the weighted variance of the cells. Cells of highlights count where the belief allows for sharp
+/// what it takes from the weighted variance of the cells. With a learned prior variances of highlights count more here
+/// than it says itself, though not in [`Plan::errors`]. Cells of highlights count where the belief allows for sharp
 /// ones only, and once [`Candidates::FEW`] directions are measured mostly by the energy that its model reflects there.
 ///
 /// Source: A. Krause, A. Singh and C. Guestrin, "Near-Optimal Sensor Placements in Gaussian Processes" (JMLR 9, 2008)
@@ -148,8 +149,10 @@ pub fn expected_error(belief: &Belief, measured: &[HalfDiff], cells: &Cells) -> 
 /// The covariance given measurements and choices.
 struct State<'a> {
     belief: &'a Belief,
-    /// Weights of the cells, times what the variance of each is larger than the process says.
+    /// Weights of the cells, times what the variance of each is larger than the process says: in the choice, and in the
+    /// expected error.
     weights: Vec<f64>,
+    of_error: Vec<f64>,
     places: Places,
     /// Covariance of cells and candidates, one column of cells per candidate.
     covariance: Vec<f64>,
@@ -206,17 +209,31 @@ impl<'a> State<'a> {
             });
             taken = from_candidates.chunks(n).map(<[f64]>::to_vec).collect();
         }
-        let calibration = belief.calibration(&cells.angles);
-        let weights: Vec<f64> = cells.weights.iter().zip(calibration).map(|(w, factor)| w * factor).collect();
+        let weighted = |factors: Vec<f64>| -> Vec<f64> {
+            cells.weights.iter().zip(factors).map(|(w, factor)| w * factor).collect()
+        };
+        let weights = weighted(belief.emphasis(&cells.angles));
+        let of_error = weighted(belief.calibration(&cells.angles));
         let scores =
             covariance.par_chunks(cells.len()).map(|column| dot3(&weights, column, column)).collect();
         let is_chosen = vec![false; candidates.len()];
-        Ok(Self { belief, weights, places, covariance, of_cells, of_candidates, taken, scores, is_chosen })
+        Ok(Self {
+            belief,
+            weights,
+            of_error,
+            places,
+            covariance,
+            of_cells,
+            of_candidates,
+            taken,
+            scores,
+            is_chosen,
+        })
     }
 
     /// The expected error.
     fn error(&self) -> f64 {
-        let variance: f64 = self.weights.iter().zip(&self.of_cells).map(|(w, v)| w * v.max(0.0)).sum();
+        let variance: f64 = self.of_error.iter().zip(&self.of_cells).map(|(w, v)| w * v.max(0.0)).sum();
         (self.belief.scale * variance).sqrt()
     }
 

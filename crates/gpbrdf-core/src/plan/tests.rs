@@ -88,16 +88,25 @@ fn expected_errors_are_those_of_the_conditioned_process() {
     }
 }
 
-/// The first choice is the best of all single measurements, and choices go on from measurements as from choices.
+/// The first choice is the best of all single measurements where highlights count as in choices, and choices go on from
+/// measurements as from choices.
 #[test]
 fn choices_are_the_best_ones_and_may_be_made_in_stages() {
     let candidates = Candidates::of(&Device { step: 30.0, theta_max: 60.0, ..Device::default() }).unwrap();
     let cells = Cells::hemisphere(200).unwrap();
     let belief = Belief::before(Some(&prior()));
     let whole = plan(&belief, &[], &candidates, &cells, Goal::Count(8)).unwrap();
-    let single = candidates.all.iter().map(|g| expected_error(&belief, &[g.angles()], &cells).unwrap());
-    let best = single.fold(f64::INFINITY, f64::min);
-    assert!((whole.errors[1] / best - 1.0).abs() < 1e-9, "{} {best}", whole.errors[1]);
+    let mut emphasised = cells.clone();
+    let (emphasis, calibration) = (belief.emphasis(&cells.angles), belief.calibration(&cells.angles));
+    let factors = emphasis.iter().zip(calibration).map(|(chosen, expected)| chosen / expected);
+    emphasised.weights.iter_mut().zip(factors).for_each(|(weight, factor)| *weight *= factor);
+    let error = |g: &Geometry| expected_error(&belief, &[g.angles()], &emphasised).unwrap();
+    let best = candidates.all.iter().map(error).fold(f64::INFINITY, f64::min);
+    let found = error(&whole.geometries[0]);
+    assert!((found / best - 1.0).abs() < 1e-9, "{found} {best}");
+    for (factor, at) in emphasis.iter().zip(&cells.angles) {
+        assert!(if at.theta_h < 0.08 { (factor - 4.0).abs() < 1e-9 } else { (1.0..=4.0).contains(factor) });
+    }
     let known: Vec<HalfDiff> = whole.geometries[..3].iter().map(|g| g.angles()).collect();
     let rest = plan(&belief, &known, &candidates, &cells, Goal::Count(5)).unwrap();
     assert_eq!(rest.geometries, whole.geometries[3..]);

@@ -56,12 +56,7 @@ impl Calibration {
             InputSpace::PlaneOfIncidence => &self.in_plane,
             _ => &self.scattered,
         };
-        let theta_h = at.theta_h.to_degrees();
-        let above = MIDDLES.partition_point(|middle| *middle < theta_h).clamp(1, MIDDLES.len() - 1);
-        let (low, high) = (MIDDLES[above - 1], MIDDLES[above]);
-        let t = ((theta_h - low) / (high - low)).clamp(0.0, 1.0);
-        let factor = (1.0 - t) * factors[above - 1] + t * factors[above];
-        factor * factor
+        of_variance_by_bands(factors, at)
     }
 
     /// The factors for errors in standard deviations, each with its direction: in each band the 90 % quantile of their
@@ -71,6 +66,17 @@ impl Calibration {
     pub(super) fn measured([scattered, in_plane]: [&[(HalfDiff, f64)]; 2]) -> Self {
         Self { scattered: measured_factors(scattered), in_plane: measured_factors(in_plane) }
     }
+}
+
+/// The square of a factor by `theta_h` that is known in the middles of four bands, those that end at 10, 30, 60 and 90
+/// degrees: linear between them and constant beyond.
+pub(crate) fn of_variance_by_bands(factors: &[f64; 4], at: &HalfDiff) -> f64 {
+    let theta_h = at.theta_h.to_degrees();
+    let above = MIDDLES.partition_point(|middle| *middle < theta_h).clamp(1, MIDDLES.len() - 1);
+    let (low, high) = (MIDDLES[above - 1], MIDDLES[above]);
+    let t = ((theta_h - low) / (high - low)).clamp(0.0, 1.0);
+    let factor = (1.0 - t) * factors[above - 1] + t * factors[above];
+    factor * factor
 }
 
 #[cfg(feature = "fit")]

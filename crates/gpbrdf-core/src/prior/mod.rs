@@ -10,7 +10,7 @@ mod file;
 mod learn;
 mod span;
 
-pub(crate) use calibration::Calibration;
+pub(crate) use calibration::{Calibration, of_variance_by_bands};
 pub use colour::Colour;
 #[cfg(feature = "fit")]
 pub(crate) use colour::to_opponent;
