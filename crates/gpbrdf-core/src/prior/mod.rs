@@ -10,7 +10,9 @@ mod file;
 mod learn;
 mod span;
 
-pub(crate) use calibration::{Calibration, of_variance_by_bands};
+pub(crate) use calibration::Calibration;
+#[cfg(feature = "fit")]
+pub(crate) use calibration::of_variance_by_bands;
 pub use colour::Colour;
 #[cfg(feature = "fit")]
 pub(crate) use colour::to_opponent;
