@@ -12,6 +12,7 @@ use crate::gp::posterior::Posterior;
 use crate::gp::report::{FitReport, Noise};
 use crate::kernel::Shape;
 use crate::prior::Prior;
+use crate::sample::blind_spots::is_in_plane;
 use crate::sample::lattice::LatticeLayout;
 use crate::sample::space::InputSpace;
 
@@ -67,6 +68,11 @@ pub(crate) struct BasisTerm<'a> {
 }
 
 impl Problem<'_> {
+    /// Whether all samples lie in the plane of incidence.
+    pub(crate) fn is_in_plane(&self) -> bool {
+        self.angles.iter().all(|angles| is_in_plane(*angles))
+    }
+
     /// Refuses samples with standard deviations of their own, for solvers whose samples share one noise.
     pub(crate) fn refuse_known_noise(&self) -> Result<()> {
         if self.known_noise.is_empty() {

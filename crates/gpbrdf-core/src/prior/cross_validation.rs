@@ -87,8 +87,7 @@ pub(super) fn calibration(library: &Library, options: &LearnOptions) -> Result<C
 type Errors = Vec<(HalfDiff, f64)>;
 
 /// The errors of a material's prediction from samples in these directions, at the centres, where its values are
-/// `truth`, in standard deviations;
-/// none where the samples are likelier without the prior.
+/// `truth`, in standard deviations; none where the samples are likelier without the prior.
 fn errors_of(
     (library, material): (&Library, usize),
     truth: &[Rgb],

@@ -16,7 +16,6 @@ use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
 use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
 use crate::sample::MeanFunction;
-use crate::sample::blind_spots::is_in_plane;
 
 /// Deviation of the brightness by which a material may differ from one of the library that it is like.
 const BRIGHTNESS: f64 = 0.5;
@@ -41,8 +40,7 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
         let cost = dense_cost(problem.angles.len(), 3, EVALUATIONS);
         FitCost { bytes: 2.0 * cost.bytes, ..cost }.check()?;
     }
-    let in_plane = || problem.angles.iter().all(|at| is_in_plane(*at));
-    let is_spread = problem.lattice.is_none() && !in_plane();
+    let is_spread = problem.lattice.is_none() && !problem.is_in_plane();
     // Fits of about the same length.
     let fits = if is_spread { 4.0 } else { 3.0 };
     let part = |nth: f64| problem.watch.part(nth / fits, (nth + 1.0) / fits);

@@ -13,7 +13,6 @@ use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
 use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
-use crate::sample::blind_spots::is_in_plane;
 use crate::sample::space::InputSpace;
 
 /// The number of samples with which leaving one out takes as long as all products.
@@ -66,10 +65,9 @@ fn left_out_share(problem: &Problem<'_>) -> f64 {
 /// Finds hyper-parameters in each of the spaces to choose from and follows those of the largest likelihood.
 fn search(problem: &Problem<'_>) -> Result<Found> {
     // What a basis leaves of samples in the plane of incidence is best taken out of it as it is.
-    let in_plane = || problem.angles.iter().all(|angles| is_in_plane(*angles));
     let spaces = match problem.space {
         Some(space) => vec![space],
-        None if problem.basis.is_some() && in_plane() => vec![InputSpace::PlaneOfIncidence],
+        None if problem.basis.is_some() && problem.is_in_plane() => vec![InputSpace::PlaneOfIncidence],
         None => InputSpace::ISOTROPIC.to_vec(),
     };
     let mut evaluations = 0;
