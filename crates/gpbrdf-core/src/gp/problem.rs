@@ -87,6 +87,45 @@ impl Problem<'_> {
     }
 }
 
+/// Some of the samples of a problem.
+#[derive(Debug)]
+pub(crate) struct Subset {
+    angles: Vec<HalfDiff>,
+    targets: Vec<Vec<f64>>,
+    known_noise: Vec<f64>,
+    /// Values of the basis functions of the problem, if it has any.
+    rows: Vec<f64>,
+}
+
+impl Subset {
+    /// The samples of these indices.
+    pub(crate) fn new(problem: &Problem<'_>, indices: &[usize]) -> Self {
+        let pick =
+            |values: &[f64]| indices.iter().filter_map(|&i| values.get(i).copied()).collect::<Vec<f64>>();
+        let rows = problem.basis.map_or_else(Vec::new, |BasisTerm { count, rows, .. }| {
+            indices.iter().flat_map(|&i| &rows[i * count..(i + 1) * count]).copied().collect()
+        });
+        Self {
+            angles: indices.iter().map(|&i| problem.angles[i]).collect(),
+            targets: problem.targets.iter().map(|y| pick(y)).collect(),
+            known_noise: pick(problem.known_noise),
+            rows,
+        }
+    }
+
+    /// The problem of these samples alone, off a lattice.
+    pub(crate) fn of<'a>(&'a self, problem: &Problem<'a>) -> Problem<'a> {
+        Problem {
+            angles: &self.angles,
+            lattice: None,
+            targets: self.targets.clone(),
+            known_noise: &self.known_noise,
+            basis: problem.basis.map(|basis| BasisTerm { rows: &self.rows, ..basis }),
+            ..problem.clone()
+        }
+    }
+}
+
 /// What is done about samples that contradict all samples around them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -5,7 +5,7 @@ pub(crate) mod factor;
 #[cfg(feature = "fit")]
 pub(crate) mod fit;
 #[cfg(feature = "fit")]
-mod inverse;
+pub(crate) mod inverse;
 #[cfg(feature = "fit")]
 mod leave_one_out;
 #[cfg(feature = "fit")]

@@ -12,7 +12,7 @@ use crate::gp::posterior::Posterior;
 use crate::gp::problem::{BasisTerm, Fitted, Problem};
 use crate::gp::report::FitReport;
 use crate::gp::scattered::cost::EVALUATIONS;
-use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process};
+use crate::gp::scattered::solve::{Conditioned, condition_process, fit_process, spread};
 use crate::gp::{FitCost, LeaveOneOut, dense_cost};
 use crate::prior::{Colour, Prior, from_opponent, to_opponent, variance_of_channels};
 use crate::sample::MeanFunction;
@@ -23,20 +23,21 @@ const BRIGHTNESS: f64 = 0.5;
 /// The least effective number of materials that shape an adapted prior.
 const FEWEST_MATERIALS: f64 = 20.0;
 
-/// The largest number of samples with which materials are compared.
-const MOST_COMPARED: usize = 512;
+/// The largest number of samples with which materials are compared. With 512 of them 1,000 samples take 1.4 times as
+/// long to fit and are not predicted better (docs/performance.md).
+const MOST_COMPARED: usize = 256;
 
 /// Finds hyper-parameters of both kinds of colour and conditions their processes. The targets are those of three
 /// channels, whose prior mean is the prior's own.
 ///
-/// The achromatic colour is fitted twice: with the prior of all materials of the library, and with the one of those
-/// that the samples resemble. For samples that are neither on a lattice nor in the plane of incidence, which say most
-/// of the directions between them, another fit of it without a prior says what the prior is worth
-/// ([`FitReport::evidence_of_prior`]).
+/// The achromatic colour is fitted twice: with the prior of all materials of the library, to a few hundred samples, and
+/// with the one of those that the samples resemble. For samples that are neither on a lattice nor in the plane of
+/// incidence, which say most of the directions between them, another fit of it without a prior says what the prior is
+/// worth ([`FitReport::evidence_of_prior`]).
 pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     if problem.factorises {
         problem.refuse_known_noise()?;
-        // The factor and the inverse.
+        // The factor, and the products of the functions.
         let cost = dense_cost(problem.angles.len(), 3, EVALUATIONS);
         FitCost { bytes: 2.0 * cost.bytes, ..cost }.check()?;
     }
@@ -44,18 +45,22 @@ pub(crate) fn fit(problem: &Problem<'_>, prior: &Arc<Prior>) -> Result<Fitted> {
     // Fits of about the same length.
     let fits = if is_spread { 4.0 } else { 3.0 };
     let part = |nth: f64| problem.watch.part(nth / fits, (nth + 1.0) / fits);
-    let fit_colour = |nth: f64, prior: &Prior, colour: Colour, space| {
+    let fit_colour = |nth: f64, problem: &Problem<'_>, prior: &Prior, colour: Colour, space| {
         let features = prior.features(colour, problem.angles);
         let watch = &part(nth);
         fit_process(&Problem { space, watch, ..of_colour(problem, prior, colour, &features) })
     };
-    let (first, first_report) = fit_colour(0.0, prior, Colour::Achromatic, problem.space)?;
-    let weights = library_weights(problem, prior, &first)?;
+    let some = spread(problem, MOST_COMPARED)?;
+    let some = some.of(problem);
+    let (first, first_report) = fit_colour(0.0, &some, prior, Colour::Achromatic, problem.space)?;
+    let weights = library_weights(&some, prior, &first)?;
     let adapted = prior.weighted(&weights)?;
-    let (bright, mut bright_report) = fit_colour(1.0, &adapted, Colour::Achromatic, Some(first.space))?;
+    let (bright, mut bright_report) =
+        fit_colour(1.0, problem, &adapted, Colour::Achromatic, Some(first.space))?;
     bright_report.evaluations += first_report.evaluations;
     // The chromatic colours take the space of the achromatic one.
-    let (coloured, coloured_report) = fit_colour(2.0, &adapted, Colour::Chromatic, Some(bright.space))?;
+    let (coloured, coloured_report) =
+        fit_colour(2.0, problem, &adapted, Colour::Chromatic, Some(bright.space))?;
     let mut evidence_of_prior = None;
     if is_spread {
         let watch = &part(3.0);
@@ -84,11 +89,10 @@ fn of_brightness_alone<'a>(problem: &Problem<'a>) -> Problem<'a> {
 /// samples if the material were that one but for its brightness, noise and the rest that the kernel describes, to a
 /// power of at most 1 at which no fewer than 20 materials count.
 fn library_weights(problem: &Problem<'_>, prior: &Prior, found: &Conditioned) -> Result<Vec<f64>> {
-    let some: Vec<usize> = found.order.iter().copied().take(MOST_COMPARED).collect();
-    let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();
+    let angles: Vec<HalfDiff> = found.order.iter().map(|&i| problem.angles[i]).collect();
     let features = prior.features(Colour::Achromatic, &angles);
     let mean = prior.mean(Colour::Achromatic, &angles);
-    let (n, count) = (some.len(), prior.n_functions(Colour::Achromatic));
+    let (n, count) = (angles.len(), prior.n_functions(Colour::Achromatic));
     if count == 0 {
         return Ok(Vec::new());
     }
@@ -110,7 +114,7 @@ fn library_weights(problem: &Problem<'_>, prior: &Prior, found: &Conditioned) ->
             let rest = |(k, &i): (usize, &usize)| {
                 colours_of(problem, i)[0] - mean[k] - dot(&features[k * count..(k + 1) * count], z)
             };
-            let mut white: Vec<f64> = some.iter().enumerate().map(rest).collect();
+            let mut white: Vec<f64> = found.order.iter().enumerate().map(rest).collect();
             solve_lower(&factor, n, &mut white);
             -0.5 * dot(&white, &white)
         })

@@ -56,12 +56,6 @@ impl Process<'_> {
         &self.x[i * dimension..(i + 1) * dimension]
     }
 
-    /// Covariance of two samples, without noise.
-    #[cfg(feature = "fit")]
-    pub(super) fn covariance(&self, i: usize, j: usize) -> f64 {
-        self.kernel.value(self.point(i), self.point(j)) + self.in_basis(self.basis.row(i), self.basis.row(j))
-    }
-
     /// The part of a covariance that is due to the basis, from its values at both points.
     pub(super) fn in_basis(&self, a: &[f64], b: &[f64]) -> f64 {
         if a.is_empty() { 0.0 } else { self.basis_variance * dot(a, b) }
@@ -71,16 +65,6 @@ impl Process<'_> {
     #[cfg(feature = "fit")]
     pub(super) fn n_parameters(&self) -> usize {
         self.kernel.n_parameters() + usize::from(self.basis.count > 0)
-    }
-
-    /// The covariance of two samples, without noise, and its derivative with respect to each log-parameter.
-    #[cfg(feature = "fit")]
-    pub(super) fn gradient(&self, i: usize, j: usize, out: &mut [f64]) -> f64 {
-        let (of_kernel, of_basis) = out.split_at_mut(self.kernel.n_parameters());
-        let value = self.kernel.gradient(self.point(i), self.point(j), of_kernel);
-        let Some(of_basis) = of_basis.first_mut() else { return value };
-        *of_basis = self.in_basis(self.basis.row(i), self.basis.row(j));
-        value + *of_basis
     }
 
     /// The least variance of a measurement of sample `i`, whatever is known.

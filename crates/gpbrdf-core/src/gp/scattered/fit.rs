@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::conditional::{Basis, JITTER, Process, Scratch};
 use super::conjugate_gradients;
 use super::cost::{EVALUATIONS, search_share};
-use super::exact;
+use super::exact::{self, Exact};
 use super::neighbours::{Embedded, Neighbours, scrambled_order};
 use super::preconditioner::Preconditioner;
 use super::product::Covariance;
@@ -103,6 +103,11 @@ impl Data {
 
     fn len(&self) -> usize {
         self.order.len()
+    }
+
+    /// The samples, for factorisations of their whole covariance with kernels of this metric.
+    fn exact(&self, kernel: &Kernel) -> Exact {
+        Exact::new(&self.x, &kernel.metric, &self.basis)
     }
 
     /// The part of each sample's noise variance that is proportional to the shared one, and the whole.
@@ -225,9 +230,9 @@ struct Likelihood<'a> {
     start: &'a SearchStart,
     weights: &'a [f64],
     kernel: Kernel,
-    /// Whether the whole covariance is factorised. With a basis all samples are correlated, so few samples are not
+    /// The whole covariance, where it is factorised. With a basis all samples are correlated, so few samples are not
     /// left to their neighbours.
-    is_exact: bool,
+    exact: Option<Exact>,
     neighbours: Neighbours,
     /// The samples over which the likelihood is summed.
     terms: Vec<u32>,
@@ -242,14 +247,14 @@ impl<'a> Likelihood<'a> {
     ) -> Result<Self> {
         let n = data.len();
         let is_exact = data.basis.count > 0 && (n <= exact::MOST_SAMPLES || problem.factorises);
-        let neighbours = if is_exact {
-            Neighbours::default()
+        let (exact, neighbours) = if is_exact {
+            (Some(data.exact(&state.kernel)), Neighbours::default())
         } else {
-            let count = conditioned_on(n);
-            Embedded::new(&data.x, &state.kernel).nearest_before(count, &problem.watch.part(0.0, 0.0))?
+            let (count, watch) = (conditioned_on(n), problem.watch.part(0.0, 0.0));
+            (None, Embedded::new(&data.x, &state.kernel).nearest_before(count, &watch)?)
         };
         let (kernel, terms) = (state.kernel.clone(), evenly(n, TERMS));
-        Ok(Self { problem, data, start, weights: &state.weights, kernel, is_exact, neighbours, terms })
+        Ok(Self { problem, data, start, weights: &state.weights, kernel, exact, neighbours, terms })
     }
 
     /// The value and its gradient at log-parameters.
@@ -266,8 +271,8 @@ impl<'a> Likelihood<'a> {
             basis_variance: others.basis_variance,
         };
         let targets = Targets { y: &self.data.y, shared_noise: &shared };
-        let (value, mut gradient, scale) = if self.is_exact {
-            let (value, gradient) = exact::log_likelihood(&process, &targets)?;
+        let (value, mut gradient, scale) = if let Some(exact) = &mut self.exact {
+            let (value, gradient) = exact.log_likelihood(&process, &targets)?;
             (value, gradient, 1.0)
         } else {
             let (value, gradient) = log_likelihood(&process, &targets, &self.neighbours, &self.terms);
@@ -324,7 +329,7 @@ impl State {
         let of_measurement = |i: usize, latent: f64| latent + self.noise_variance + data.known_noise[i];
         if data.basis.count > 0
             && data.len() <= exact::MOST_SAMPLES
-            && let Ok((residuals, variances)) = exact::leave_one_out(&process, &data.y)
+            && let Ok((residuals, variances)) = data.exact(&self.kernel).leave_one_out(&process, &data.y)
         {
             let latent = variances.iter().zip(&all).map(|(v, noise)| (v - noise).max(0.0));
             let variances = latent.enumerate().map(|(i, latent)| of_measurement(i, latent)).collect();
@@ -474,7 +479,7 @@ impl State {
     /// A covariance that is not positive definite.
     pub(super) fn basis_coefficients(&self, data: &Data) -> Result<Vec<Vec<f64>>> {
         let (_, all) = data.noise(self.noise_variance, &self.weights);
-        let weights = exact::weights(&self.process(data, &all), &data.y)?;
+        let weights = data.exact(&self.kernel).weights(&self.process(data, &all), &data.y)?;
         let of_channel = |weights: &[f64]| data.basis.weighted_sum(self.basis_variance, weights);
         Ok(weights.chunks(data.len().max(1)).map(of_channel).collect())
     }

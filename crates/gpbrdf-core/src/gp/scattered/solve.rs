@@ -8,10 +8,9 @@ use super::posterior::ScatteredPosterior;
 use super::{ScatteredGp, Widening, exact};
 use crate::base::error::{Error, Result};
 use crate::base::simd::dot;
-use crate::brdf::angles::HalfDiff;
 use crate::gp::hyper::Hyper;
 use crate::gp::posterior::Posterior;
-use crate::gp::problem::{BasisTerm, Fitted, Problem};
+use crate::gp::problem::{BasisTerm, Fitted, Problem, Subset};
 use crate::gp::report::FitReport;
 use crate::sample::space::InputSpace;
 
@@ -97,26 +96,14 @@ fn search(problem: &Problem<'_>) -> Result<Found> {
 /// coefficients: these and the variance of the basis come from 512 samples, space, kernel and noise from what they
 /// leave of all samples.
 fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Found> {
-    let first = problem.space.unwrap_or(InputSpace::ISOTROPIC[0]);
-    let some: Vec<usize> = data(problem, first)?.order().take(exact::MOST_SAMPLES).collect();
-    let pick = |values: &[f64]| some.iter().filter_map(|&i| values.get(i).copied()).collect::<Vec<f64>>();
-    let row = |i: usize| &basis.rows[i * basis.count..(i + 1) * basis.count];
-    let angles: Vec<HalfDiff> = some.iter().map(|&i| problem.angles[i]).collect();
-    let rows: Vec<f64> = some.iter().flat_map(|&i| row(i)).copied().collect();
-    let known_noise = pick(problem.known_noise);
+    let some = spread(problem, exact::MOST_SAMPLES)?;
     let halves = [(0.0, 0.5), (0.5, 1.0)].map(|(from, to)| {
         let end = left_out_share(problem);
         problem.watch.part(from * end, to * end)
     });
-    let few = search(&Problem {
-        watch: &halves[0],
-        angles: &angles,
-        targets: problem.targets.iter().map(|y| pick(y)).collect(),
-        known_noise: &known_noise,
-        basis: Some(BasisTerm { rows: &rows, ..basis }),
-        ..problem.clone()
-    })?;
+    let few = search(&Problem { watch: &halves[0], ..some.of(problem) })?;
     let coefficients = few.state.basis_coefficients(&few.data)?;
+    let row = |i: usize| &basis.rows[i * basis.count..(i + 1) * basis.count];
     let left =
         |(y, z): (&Vec<f64>, &Vec<f64>)| y.iter().enumerate().map(|(i, y)| y - dot(row(i), z)).collect();
     let in_plane = few.space == InputSpace::PlaneOfIncidence;
@@ -149,6 +136,13 @@ pub(crate) fn condition_process(problem: &Problem<'_>, hyper: &Hyper) -> Result<
     let widening = state.widening(&data, space, &problem.watch.part(0.0, 0.1))?;
     let (gp, value) = state.condition(&problem.watch.part(0.1, 1.0), &data)?;
     Ok((Conditioned { gp: gp.widened(widening)?, space, order: data.order().collect() }, value))
+}
+
+/// At most `count` samples that are spread like all of them, whatever their order.
+pub(crate) fn spread(problem: &Problem<'_>, count: usize) -> Result<Subset> {
+    let space = problem.space.unwrap_or(InputSpace::ISOTROPIC[0]);
+    let indices: Vec<usize> = data(problem, space)?.order().take(count).collect();
+    Ok(Subset::new(problem, &indices))
 }
 
 /// The samples in the coordinates of a space.
