@@ -377,7 +377,7 @@ fn unit(random: &mut SplitMix64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{material, materials};
+    use crate::brdf::material;
 
     fn table_of(name: &str) -> BrdfTable {
         let brdf = crate::brdf::Reciprocal { inner: material(name).unwrap().brdf, min_cosine: 1e-3 };
@@ -435,7 +435,7 @@ mod tests {
     #[ignore = "takes minutes: cargo test --release -p gpbrdf-core all_materials -- --ignored"]
     fn all_materials_are_sampled_as_their_density_says() {
         let mut all: Vec<(String, BrdfTable)> =
-            materials().iter().map(|m| (m.name.to_owned(), table_of(m.name))).collect();
+            crate::brdf::materials().iter().map(|m| (m.name.to_owned(), table_of(m.name))).collect();
         if let Some(data) = crate::test_data::data_dir() {
             let folder = std::fs::read_dir(data.join("rgl")).unwrap();
             let mut paths: Vec<_> = folder.map(|entry| entry.unwrap().path()).collect();

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use crate::base::error::{Error, Result};
 use crate::brdf::angles::HalfDiff;
 use crate::gp::Hyper;
-use crate::kernel::{Kernel, Points, Shape};
+use crate::kernel::{Kernel, KernelBody, Points, Shape};
 use crate::model::{FitOptions, Model};
 use crate::prior::{Colour, Prior, of_variance_by_bands};
+use crate::sample::space::about_plane;
 use crate::sample::{InputSpace, SampleSet};
 
 /// The noise variance of measurements that were not made yet.
@@ -38,7 +39,8 @@ pub struct Belief {
     pub(super) basis_variance: f64,
     /// `k`.
     pub(super) kernel: Kernel,
-    /// The coordinates of the kernel.
+    /// The coordinates of the kernel. In those of the plane of incidence the distance from it is the third one, so that
+    /// plans leave a plane that was measured.
     pub(super) space: InputSpace,
     /// Noise variance of a measurement.
     pub(super) noise_variance: f64,
@@ -103,7 +105,11 @@ impl Belief {
             scale: scale(prior.is_some()),
             prior,
             basis_variance: hyper.basis_variance.unwrap_or(0.0),
-            kernel: hyper.kernel.clone(),
+            kernel: if space == InputSpace::PlaneOfIncidence {
+                with_distance_from_plane(&hyper.kernel)
+            } else {
+                hyper.kernel.clone()
+            },
             space,
             noise_variance: hyper.noise_variance.max(1e-9 * hyper.kernel.prior_variance()),
             highlights: Highlights::Unknown,
@@ -147,13 +153,27 @@ impl Belief {
     /// Coordinates and functions of directions.
     pub(super) fn places(&self, angles: &[HalfDiff]) -> Places {
         let features = self.prior.as_ref().map(|prior| prior.features(Colour::Achromatic, angles));
-        let x = self.space.points(angles);
+        let x = match self.space {
+            InputSpace::PlaneOfIncidence => angles.iter().flat_map(|&at| about_plane(at)).collect(),
+            space => space.points(angles),
+        };
         Places {
             points: Points::new(&x, &self.kernel.metric),
             count: self.prior.as_ref().map_or(0, |prior| prior.n_functions(Colour::Achromatic)),
             features: features.unwrap_or_default(),
         }
     }
+}
+
+/// A kernel of samples in the plane of incidence that counts the distance from it like the first coordinate.
+fn with_distance_from_plane(kernel: &Kernel) -> Kernel {
+    let mut kernel = kernel.clone();
+    for term in &mut kernel.terms {
+        if let KernelBody::Ard { length_scale, .. } = &mut term.body {
+            length_scale[2] = length_scale[0];
+        }
+    }
+    kernel
 }
 
 /// Whether the mirror direction is much brighter than 5 degrees beside it, at some `theta_d`.

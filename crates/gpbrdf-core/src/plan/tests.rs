@@ -6,9 +6,10 @@ use super::*;
 use crate::brdf::{angles::HalfDiff, materials};
 use crate::gp::Solver;
 use crate::judge::Environment;
+use crate::kernel::{Kernel, Shape};
 use crate::model::{FitOptions, IntervalOf, PriorChoice, condition, fit};
 use crate::prior::{LearnOptions, Library, Prior, learn};
-use crate::sample::{Sample, SampleSet};
+use crate::sample::{InPlaneScan, InputSpace, Sample, SampleSet};
 use crate::{Brdf, Hyper};
 
 fn prior() -> Arc<Prior> {
@@ -161,6 +162,29 @@ fn the_first_measurements_are_planned_at_coarse_steps() {
     assert!(plan(&belief, &[], &candidates, &cells, Goal::Count(candidates.len())).is_ok());
     let message = plan(&belief, &[], &candidates, &cells, Goal::Count(1_000_000)).unwrap_err().to_string();
     assert!(message.contains("expected at most ") && message.ends_with("found 1000000"), "{message}");
+}
+
+/// A scan in the plane of incidence says nothing of other directions, and its plan knows.
+#[test]
+fn plans_leave_a_plane_that_was_measured() {
+    let prior = prior();
+    let hyper = Hyper {
+        basis_variance: Some(1.0),
+        ..Hyper::new(
+            Solver::Scattered,
+            Kernel::ard(0.05, Shape::Matern52, &[0.2, 0.35, 0.01]),
+            1e-4,
+            Some(InputSpace::PlaneOfIncidence),
+        )
+    };
+    let belief = Belief::of_fit(&hyper, Some(&prior)).unwrap();
+    let scan = InPlaneScan { count: 100, ..InPlaneScan::default() }.directions().unwrap();
+    let scan: Vec<HalfDiff> = scan.iter().map(|[wi, wo]| HalfDiff::from_directions(wi, wo)).collect();
+    let candidates = Candidates::of(&Device::default()).unwrap();
+    let cells = Cells::usual(None, 500).unwrap();
+    let plan = plan(&belief, &scan, &candidates, &cells, Goal::Count(10)).unwrap();
+    let outside = plan.geometries.iter().filter(|g| g.phi_o % 180.0 != 0.0).count();
+    assert!(outside >= 8, "{:?}", plan.geometries);
 }
 
 #[test]

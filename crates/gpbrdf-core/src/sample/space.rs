@@ -124,7 +124,8 @@ pub enum InputSpace {
     /// to where it came from.
     DifferenceAngle,
     /// `((theta_h / (pi/2))^0.7, v, 0)` with `v = min(theta_d / theta_d_max, 1)`: functions that do not depend on
-    /// `phi_d` between the horizons. Samples that all lie in the plane of incidence say nothing about `phi_d`.
+    /// `phi_d` between the horizons. Samples that all lie in the plane of incidence say nothing about `phi_d`;
+    /// intervals out of that plane are wider for it.
     PlaneOfIncidence,
     /// `(theta_h, theta_d, phi_d)` in radians, without a warp. This is the paper's own setting.
     HalfDiff,
@@ -148,8 +149,8 @@ impl InputSpace {
                 [half, above_horizon(angles) / FRAC_PI_2, (light - viewer).abs()]
             }
             Self::PlaneOfIncidence => {
-                let v = BoxPoint::from_half_diff(angles).v.min(1.0);
-                [(angles.theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT), v, 0.0]
+                let [u, v, _] = about_plane(angles);
+                [u, v, 0.0]
             }
             Self::HalfDiff => [angles.theta_h, angles.theta_d, fold_phi_d(angles.phi_d)],
         }
@@ -228,6 +229,14 @@ const HALF_ANGLE_EXPONENT: f64 = 0.7;
 /// stretching sets in.
 const STRETCH: (f64, f64) = (0.25, 0.05);
 
+/// The first two coordinates of [`InputSpace::PlaneOfIncidence`], `(u, v)`, and the distance from the plane of
+/// incidence in the unit of `u`: `u v |sin(phi_d)|`, which is 0 in the plane and where `phi_d` has no meaning.
+pub(crate) fn about_plane(angles: HalfDiff) -> [f64; 3] {
+    let u = (angles.theta_h / FRAC_PI_2).powf(HALF_ANGLE_EXPONENT);
+    let v = BoxPoint::from_half_diff(angles).v.min(1.0);
+    [u, v, u * v * angles.phi_d.sin().abs()]
+}
+
 /// `theta_d`, or that of the horizon for directions below it.
 fn above_horizon(angles: HalfDiff) -> f64 {
     if angles.is_above_horizon() { angles.theta_d } else { theta_d_max(angles.theta_h, angles.phi_d) }
@@ -301,6 +310,19 @@ mod tests {
             let below = HalfDiff { theta_h: 1.0, theta_d: 1.3, phi_d: 0.2 };
             near(below, HalfDiff { theta_d: 1.4, ..below });
         }
+    }
+
+    #[test]
+    fn the_distance_from_the_plane_is_0_in_it_and_where_it_has_no_meaning() {
+        let at = |theta_h, theta_d, phi_d| HalfDiff { theta_h, theta_d, phi_d };
+        for in_plane in [at(0.3, 0.5, 0.0), at(0.3, 0.5, PI), at(0.0, 0.5, 1.0), at(0.3, 0.0, 1.0)] {
+            assert!(about_plane(in_plane)[2] < 1e-15, "{in_plane:?}");
+        }
+        let [u, v, beside] = about_plane(at(0.3, 0.5, 0.8));
+        assert_eq!(InputSpace::PlaneOfIncidence.coordinates(at(0.3, 0.5, 0.8)), [u, v, 0.0]);
+        assert!((beside - u * v * 0.8f64.sin()).abs() < 1e-15);
+        assert!((about_plane(at(0.3, 0.5, PI - 0.8))[2] - beside).abs() < 1e-15);
+        assert!((about_plane(at(0.3, 0.5, -0.8))[2] - beside).abs() < 1e-15);
     }
 
     #[test]

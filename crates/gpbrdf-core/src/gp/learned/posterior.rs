@@ -17,7 +17,7 @@ use crate::gp::tensors::{TensorReader, TensorWriter};
 use crate::kernel::Kernel;
 use crate::prior::{Colour, OPPONENT, Prior, PriorHeader, SPACE, from_opponent, variance_of_channels};
 use crate::sample::layout::random_directions;
-use crate::sample::space::InputSpace;
+use crate::sample::space::{InputSpace, about_plane};
 
 /// The solver's name in files and reports.
 pub(crate) const NAME: &str = "learned";
@@ -33,6 +33,19 @@ pub(super) struct Part {
     pub(super) space: InputSpace,
     /// Directions of the samples, in the order of the process.
     pub(super) angles: Vec<HalfDiff>,
+}
+
+impl Part {
+    /// What samples in the plane of incidence leave open out of it: there the mean takes what the functions leave as
+    /// it is in the plane, along `phi_d`. If that changes with the distance `z` from the plane as it does with
+    /// `theta_h`, the variance of the error is `2 (k(0) - k(z))`. 0 for samples that lie otherwise.
+    fn variance_off_plane(&self, at: HalfDiff) -> f64 {
+        if self.space != InputSpace::PlaneOfIncidence {
+            return 0.0;
+        }
+        let ([_, _, distance], kernel) = (about_plane(at), self.gp.kernel());
+        2.0 * (kernel.prior_variance() - kernel.value(&[distance, 0.0, 0.0], &[0.0; 3]))
+    }
 }
 
 /// The processes of both kinds of colour, and what they share.
@@ -231,10 +244,13 @@ impl Posterior for LearnedPosterior {
     fn predict_variance(&self, angles: &[HalfDiff]) -> Result<Vec<f64>> {
         check_finite(angles)?;
         let [bright, coloured] = Colour::ALL.map(|colour| {
-            let Part { gp, space, .. } = &self.parts[colour as usize];
-            gp.variance_at(&space.points(angles), &self.adapted.features(colour, angles))
+            let part = &self.parts[colour as usize];
+            let features = self.adapted.features(colour, angles);
+            let mut variances = part.gp.variance_at(&part.space.points(angles), &features)?;
+            variances.iter_mut().zip(angles).for_each(|(v, &at)| *v += part.variance_off_plane(at));
+            Ok(variances)
         });
-        let (bright, coloured) = (bright?, coloured?);
+        let (bright, coloured): (Vec<f64>, Vec<f64>) = (bright?, coloured?);
         let rows = bright.into_iter().zip(coloured).zip(angles);
         let calibration = self.prior.calibration();
         let space = self.space();

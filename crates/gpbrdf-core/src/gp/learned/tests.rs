@@ -1,10 +1,13 @@
 use nalgebra::{DMatrix, DVector};
 
+use crate::brdf::angles::theta_d_max;
 use crate::brdf::{Brdf, HalfDiff, material, materials};
-use crate::gp::Solver;
+use crate::gp::{Hyper, Solver};
+use crate::kernel::{Kernel, Shape};
 use crate::model::{FitOptions, IntervalOf, Model, PriorChoice, condition, fit};
 use crate::prior::{Colour, LearnOptions, Library, Prior, learn, to_opponent, variance_of_channels};
-use crate::sample::{Layout, SampleSet};
+use crate::sample::{InPlaneScan, InputSpace, Layout, SampleSet};
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 /// What the built-in materials but `left_out` have in common.
@@ -31,12 +34,46 @@ fn test_angles() -> Vec<HalfDiff> {
     [(0.0, 0.3, 0.0), (0.05, 0.9, 1.0), (0.6, 0.1, 2.0), (0.9, 0.5, 1.5), (0.3, 0.7, 0.2)].map(at).to_vec()
 }
 
-/// Mean and variance beside the formula with explicit matrices: `K = k + v B B^T + noise`.
 #[test]
 fn predictions_are_those_of_the_kernel_with_a_basis() {
     let (prior, samples) = (prior("red-plastic"), samples("red-plastic", 40));
     let fitted = fit(&samples, &options(&prior)).unwrap();
-    let hyper = fitted.model.hyper().unwrap();
+    check_predictions(&prior, &samples, &fitted.model, fitted.reports[0].log_marginal_likelihood);
+}
+
+#[test]
+fn samples_in_the_plane_of_incidence_leave_open_what_is_out_of_it() {
+    let prior = prior("red-plastic");
+    let scan = Layout::InPlane(InPlaneScan { count: 60, ..InPlaneScan::default() });
+    let samples = SampleSet::measure(&material("red-plastic").unwrap().brdf, &scan).unwrap();
+    let of_colour = |variance| Hyper {
+        basis_variance: Some(1.3),
+        ..Hyper::new(
+            Solver::Scattered,
+            Kernel::ard(variance, Shape::Matern52, &[0.2, 0.4, 0.01]),
+            1e-3,
+            Some(InputSpace::PlaneOfIncidence),
+        )
+    };
+    let hyper = Hyper {
+        chromatic: Some(Box::new(of_colour(0.01))),
+        library_weights: vec![1.0; prior.materials.len()],
+        ..of_colour(0.2)
+    };
+    let known = condition(&samples, &options(&prior), &hyper).unwrap();
+    check_predictions(&prior, &samples, &known.model, known.log_marginal_likelihood);
+    // As far as half vectors are from the plane, in the length of `theta_h`.
+    let sigma = |phi_d: f64| {
+        let at = HalfDiff { theta_h: 0.5, theta_d: 0.6, phi_d };
+        known.model.predict_variance(&[at], IntervalOf::Latent).unwrap()[0][0].sqrt()
+    };
+    let growing: Vec<f64> = [0.0, 0.2, 0.5, FRAC_PI_2].map(sigma).to_vec();
+    assert!(growing.windows(2).all(|pair| pair[1] > 1.2 * pair[0]), "{growing:?}");
+}
+
+/// Mean and variance beside the formula with explicit matrices: `K = k + v B B^T + noise`.
+fn check_predictions(prior: &Prior, samples: &SampleSet, model: &Model, reported: f64) {
+    let hyper = model.hyper().unwrap();
     let test = test_angles();
     let adapted = prior.adapted(&hyper.library_weights).unwrap();
     let n = samples.len();
@@ -73,13 +110,21 @@ fn predictions_are_those_of_the_kernel_with_a_basis() {
             for j in 0..test.len() {
                 expected[0][j][row] = mean_test[j] + predicted[j];
                 let own_row = b_test.row(j);
+                let off_plane = if space == InputSpace::PlaneOfIncidence {
+                    let HalfDiff { theta_h, theta_d, phi_d } = test[j];
+                    let v = theta_d / theta_d_max(theta_h, phi_d);
+                    let z = (theta_h / FRAC_PI_2).powf(0.7) * v * phi_d.sin();
+                    2.0 * (own.kernel.prior_variance() - own.kernel.value(&[z, 0.0, 0.0], &[0.0; 3]))
+                } else {
+                    0.0
+                };
                 expected[1][j][row] =
-                    own.kernel.prior_variance() + v * own_row.dot(&own_row) - explained[(j, j)];
+                    own.kernel.prior_variance() + v * own_row.dot(&own_row) - explained[(j, j)] + off_plane;
             }
         }
     }
-    let found = fitted.model.predict_target(&test);
-    let variances = fitted.model.predict_variance(&test, IntervalOf::Latent).unwrap();
+    let found = model.predict_target(&test);
+    let variances = model.predict_variance(&test, IntervalOf::Latent).unwrap();
     for j in 0..test.len() {
         let colours = to_opponent(found[j]);
         for c in 0..3 {
@@ -90,7 +135,6 @@ fn predictions_are_those_of_the_kernel_with_a_basis() {
         let variance = calibration * variance_of_channels(expected[1][j][0], expected[1][j][1]);
         assert!((variances[j][0] / variance - 1.0).abs() < 1e-3, "{j}: {} {variance}", variances[j][0]);
     }
-    let reported = fitted.reports[0].log_marginal_likelihood;
     assert!((reported / log_likelihood - 1.0).abs() < 5e-3, "{reported} {log_likelihood}");
 }
 

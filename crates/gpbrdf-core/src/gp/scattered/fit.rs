@@ -23,8 +23,9 @@ use crate::gp::{LeaveOneOut, OptimizeOptions, Optimum, maximize};
 use crate::kernel::{Kernel, Points};
 use crate::sample::space::InputSpace;
 
-/// Number of earlier samples that each conditional of the likelihood keeps, for few samples and for many.
-const FEW: (usize, usize) = (1000, 40);
+/// Number of earlier samples that each conditional of the likelihood keeps, for few samples and for many. Of 400 to
+/// 1,000 samples 40 take twice as long as 24 and predict no better (docs/performance.md).
+const FEW: (usize, usize) = (300, 40);
 const MANY: usize = 24;
 
 /// The likelihood of a search is summed over at most this number of samples, spread evenly over the order. Each
