@@ -85,7 +85,7 @@ pub(super) fn is_possible(context: &Context) -> bool {
 
 /// The expected time in seconds.
 pub(super) fn seconds(context: &Context) -> f64 {
-    materials(context).len() as f64 * if context.quick { 75.0 } else { 130.0 }
+    materials(context).len() as f64 * if context.quick { 25.0 } else { 50.0 }
 }
 
 pub(super) fn run(context: &Context) -> Result<Outcome> {
