@@ -2,13 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use rayon::prelude::*;
-
 use super::DenseGp;
-use super::factor::INVERSE_COLUMNS;
-use super::inverse::{inverse_blocks, inverse_factor_columns};
+use super::inverse::left_out_variances;
 use crate::base::error::Result;
-use crate::base::simd::dot;
 
 /// The predictions of every sample from all others.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,18 +32,7 @@ impl DenseGp {
     pub fn leave_one_out(&self) -> Result<LeaveOneOut> {
         let n = self.points.len();
         let factor = self.factor()?;
-        // [K^-1]_ii is the squared norm of column i of L^-1.
-        let variances: Vec<Vec<f64>> = inverse_blocks(n)
-            .map_init(
-                || vec![0.0; n * INVERSE_COLUMNS],
-                |block, (first, width)| {
-                    let block = &mut block[..(n - first) * width];
-                    inverse_factor_columns(factor, n, first, width, block);
-                    block.chunks(n - first).map(|column| dot(column, column).recip()).collect()
-                },
-            )
-            .collect();
-        let variances = variances.concat();
+        let variances = left_out_variances(factor, n);
         let mut residuals = vec![0.0; n * self.channels];
         let mut log_predictive_density = 0.0;
         for (c, alpha) in self.alpha.chunks(n).enumerate() {

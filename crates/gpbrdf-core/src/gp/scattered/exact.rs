@@ -7,15 +7,12 @@ use super::vecchia::Targets;
 use crate::base::error::{Error, Result};
 use crate::base::linalg::{factorize, half_log_det, product, solve, view_slice};
 use crate::base::simd::{add_scaled, dot};
-use crate::gp::dense::factor::INVERSE_COLUMNS;
-use crate::gp::dense::inverse::{inverse_blocks, inverse_columns, inverse_factor_columns};
-use crate::kernel::{AxisMetric, GradientScratch, Points, RowScratch};
+use crate::gp::dense::factor::{INVERSE_COLUMNS, assemble};
+use crate::gp::dense::inverse::{inverse_blocks, inverse_columns, left_out_variances};
+use crate::kernel::{AxisMetric, GradientScratch, Points};
 
 /// The largest number of samples whose covariance is factorised as a whole in a search.
 pub(super) const MOST_SAMPLES: usize = 512;
-
-/// Number of columns of the covariance that one parallel task assembles.
-const COLUMNS: usize = 16;
 
 /// Samples and a matrix to work in, for many factorisations of their covariance at different hyper-parameters.
 ///
@@ -110,16 +107,7 @@ impl Exact {
     ) -> Result<(Vec<f64>, Vec<f64>)> {
         let n = self.points.len();
         let weights = self.weights(process, y)?;
-        // The diagonal of L^-T L^-1.
-        let variances: Vec<Vec<f64>> = inverse_blocks(n)
-            .map(|(first, width)| {
-                let rows = n - first;
-                let mut block = vec![0.0; rows * width];
-                inverse_factor_columns(&self.matrix, n, first, width, &mut block);
-                block.chunks(rows).map(|column| dot(column, column).recip()).collect()
-            })
-            .collect();
-        let variances = variances.concat();
+        let variances = left_out_variances(&self.matrix, n);
         let residuals = variances
             .iter()
             .enumerate()
@@ -132,21 +120,14 @@ impl Exact {
     /// # Errors
     /// A covariance that is not positive definite.
     pub(super) fn weights(&mut self, process: &Process<'_>, y: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let (n, kernel) = (self.points.len(), process.kernel);
-        let (points, gram) = (&self.points, &self.gram);
-        self.matrix.par_chunks_mut(n.max(1) * COLUMNS).enumerate().for_each_init(
-            || RowScratch::new(kernel.dimension()),
-            |scratch, (block, columns)| {
-                for (column, j) in columns.chunks_mut(n).zip(block * COLUMNS..) {
-                    let column = &mut column[j..];
-                    kernel.row(points, j..n, points, j, scratch, column);
-                    if !gram.is_empty() {
-                        add_scaled(process.basis_variance, &gram[j * n + j..(j + 1) * n], column);
-                    }
-                    column[0] = process.diagonal(j);
-                }
-            },
-        );
+        let n = self.points.len();
+        assemble(process.kernel, &self.points, 0.0, &mut self.matrix);
+        for (j, column) in self.matrix.chunks_mut(n).enumerate() {
+            if !self.gram.is_empty() {
+                add_scaled(process.basis_variance, &self.gram[j * n + j..(j + 1) * n], &mut column[j..]);
+            }
+            column[j] = process.diagonal(j);
+        }
         if !factorize(&mut self.matrix, n) {
             return Err(Error::NotPositiveDefinite { size: n, largest_jitter: JITTER });
         }

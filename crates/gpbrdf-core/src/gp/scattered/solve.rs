@@ -93,7 +93,7 @@ fn search(problem: &Problem<'_>) -> Result<Found> {
 }
 
 /// Like [`search`] for many samples with a basis, which correlates all of them, so that neighbours do not tell its
-/// coefficients: these and the variance of the basis come from 512 samples, space, kernel and noise from what they
+/// coefficients: these, the variance of the basis and the space come from 512 samples, kernel and noise from what they
 /// leave of all samples.
 fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Found> {
     let some = spread(problem, exact::MOST_SAMPLES)?;
@@ -106,11 +106,10 @@ fn search_with_basis(problem: &Problem<'_>, basis: BasisTerm<'_>) -> Result<Foun
     let row = |i: usize| &basis.rows[i * basis.count..(i + 1) * basis.count];
     let left =
         |(y, z): (&Vec<f64>, &Vec<f64>)| y.iter().enumerate().map(|(i, y)| y - dot(row(i), z)).collect();
-    let in_plane = few.space == InputSpace::PlaneOfIncidence;
     let rest = search(&Problem {
         watch: &halves[1],
         targets: problem.targets.iter().zip(&coefficients).map(left).collect(),
-        space: if in_plane { Some(few.space) } else { problem.space },
+        space: Some(few.space),
         basis: None,
         ..problem.clone()
     })?;
